@@ -77,9 +77,8 @@ def fuse(
     seen, zero_s = logs.as_seen(range_.instruments, read, range_.origin)
     logs.check_overlap(range_, seen)
     try:
-        fused = whole.fuse(
-            seen, settings.gate, settings.jerk_psd_m2ps5, settings.smooth, say, preparing.motions(settings)
-        )
+        among = preparing.motions(settings, range_.origin)
+        fused = whole.fuse(seen, settings.gate, settings.jerk_psd_m2ps5, settings.smooth, say, among)
     except engine.Alone as cause:
         names = ", ".join(station.name for station in seen)
         raise InputError(

@@ -25,7 +25,7 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, likelihood_of, smooth_log
 from ftproc.core.identification import likelihood
 from ftproc.core.identification.motions import motion_models, orbits
-from ftproc.core.identification.motions.motion_models import Chosen
+from ftproc.core.identification.motions.motion_models import Candidates, Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
 from ftproc.methods import bridging, live, preparing, scalars
 from ftproc.methods.bridging import Bridged
@@ -80,21 +80,21 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     channels = [each for each in (channel, height) if each is not None and not each.why]
     used = tuple(each.rates if each.used is None else each.used for each in channels)
     told = tuple(each.silent if each is height else one for each, one in zip(channels, used, strict=True))
-    names = preparing.motions(settings)
-    if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
-        names = (motion_models.WHITE,)
+    among = preparing.motions(settings, settings.site, readings.north)
+    if len(edited.starts) > MOST_PIECES and motion_models.WHITE in among.names:
+        among = motion_models.ONLY_WHITE
     again = preparing.re_initialized(edited.starts)
     over = _bridged(log, model, edited.starts, settings.jerk_psd_m2ps5 is not None)
     label = preparing.labels(np.where(over.read, 0.0, over.log.weight), log.measurement)
 
-    def chosen(names: tuple[str, ...], white: Model) -> Chosen:
-        found = motion_models.choose(over.log, over.starts, white, names, specified)
+    def chosen(among: Candidates, white: Model) -> Chosen:
+        found = motion_models.choose(over.log, over.starts, white, among, specified)
         return found if channel is None or channel.used is None else found.with_beside(told)
 
     wanted = PATHS if settings.smooth else STATES  # cheap, proves the correction, and says what could be had
-    motion = chosen(names, over.model)
+    motion = chosen(among, over.model)
     others, edited = edited.others, edited._replace(log=over.log, model=motion.white, starts=over.starts)
-    white = chosen((motion_models.WHITE,), motion.white) if motion_models.WHITE in names else motion
+    white = chosen(motion_models.ONLY_WHITE, motion.white) if motion_models.WHITE in among.names else motion
     motion, (run, smoothed, left) = _followed(motion, white, wanted)
     if height is not None and not height.why:
         motion = motion.with_beside(used)

@@ -36,7 +36,7 @@ class Readings(NamedTuple):
     the log tells; the times of the readings of each component that are accepted by hand; and how the noise of single
     readings is known to differ, if it is. range_rate: (n,) m/s, NaN where missing, if there are such, and the interval
     in which they are ambiguous, zero if they are not. heights: beside elevations. edited: the same, if they have been
-    edited before."""
+    edited before. north: which axis points there, where a site is known."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -47,6 +47,7 @@ class Readings(NamedTuple):
     rate_interval_mps: float = 0.0
     heights: Heights | None = None
     edited: Edited | None = None
+    north: int = 1
 
     def unedited(self) -> Observations:
         """The log with every reading used."""
@@ -63,7 +64,7 @@ class Recording:
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
     rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven, range_rate,
-    rate_interval_mps, heights, edited (all of it): as in `Readings`.
+    rate_interval_mps, heights, edited (all of it), north: as in `Readings`.
     """
 
     time_s: FloatArray
@@ -77,6 +78,7 @@ class Recording:
     rate_interval_mps: float = 0.0
     heights: Heights | None = None
     edited: Edited | None = None
+    north: int = 1
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -95,7 +97,7 @@ class Recording:
         measurement = np.ascontiguousarray(measurement)
         heights = self.heights and self.heights._replace(above_m=bounded(self.heights.above_m[rows]))
         beside = uneven, rate, self.rate_interval_mps, heights
-        return Readings(time_s, measurement, self.assumed_sigma, self.accepted, *beside)
+        return Readings(time_s, measurement, self.assumed_sigma, self.accepted, *beside, north=self.north)
 
     def spans(self) -> list[slice]:
         """SPANS stretches of SPAN samples, spread evenly: what noise and usual jerk of a long log are found from."""

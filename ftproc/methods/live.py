@@ -36,7 +36,7 @@ HISTORY = 256  # samples before a stretch that go with it: the network uses samp
 def editor(settings: FilterSettings, accepted: Accepted = NOTHING) -> LiveEditor:
     """An editor that has seen nothing, with these settings. accepted: see `Known`."""
     sigma = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
-    white_jerk = "turning-force" not in preparing.motions(settings)
+    white_jerk = "turning-force" not in preparing.motions(settings, None).names
     known = Known(sigma, settings.jerk_psd_m2ps5, settings.gate, accepted, white_jerk=white_jerk)
     if settings.editing == "forward":
         return LiveEditor(known, window=Gating(settings.gate, settings.max_patch_s, settings.gain_form).window)

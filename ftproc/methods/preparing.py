@@ -13,9 +13,11 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between
 from ftproc.core.filtering.smoother import HEADS, PATHS, smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
-from ftproc.core.identification.motions import motion_models
+from ftproc.core.identification.motions import motion_models, orbits
+from ftproc.core.identification.motions.motion_models import Candidates
 from ftproc.core.identification.profile import from_knot, median_level
 from ftproc.core.identification.scales import scales_of
+from ftproc.core.model.earth import Geodetic
 from ftproc.core.model.motion import isotropic
 from ftproc.methods.estimate import Estimate, Readings, Recording
 from ftproc.records import MISSING, FlagArray, FloatArray
@@ -126,11 +128,14 @@ def what_is_known(readings: Readings | Recording, settings: FilterSettings) -> t
     return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate, readings.accepted, readings.uneven)
 
 
-def motions(settings: FilterSettings) -> tuple[str, ...]:
-    """The models of motion to choose from. A jerk density that the user has specified is that of white jerk."""
+def motions(settings: FilterSettings, site: Geodetic | None, north: int = 1) -> Candidates:
+    """The models of motion to choose from. A jerk density that the user has specified is that of white jerk. site: of
+    the station, where it is known; north: which axis points there."""
     if settings.motion != AUTO:
-        return (settings.motion,)
-    return (motion_models.WHITE,) if settings.jerk_psd_m2ps5 is not None else tuple(motion_models.MODELS)
+        names: tuple[str, ...] = (settings.motion,)
+    else:
+        names = (motion_models.WHITE,) if settings.jerk_psd_m2ps5 is not None else tuple(motion_models.MODELS)
+    return Candidates(names, None if site is None else orbits.earth_from(site, north))
 
 
 def labels(weight: FloatArray, measurement: FloatArray) -> FlagArray:

@@ -44,6 +44,7 @@ def recording(log: MeasurementLog) -> Recording:
     return Recording(
         log.time_s, log.measurement, assumed, absent, rejected, accepted, range_rate=rate,
         rate_interval_mps=log.station.range_rate_interval_mps, heights=None if absent else heights,
+        north=0 if log.frame == "north-east-up" else 1,
     )  # fmt: skip
 
 

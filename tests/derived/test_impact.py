@@ -13,8 +13,9 @@ from ftproc.core import impact
 from ftproc.core.filtering.records import Model, Start
 from ftproc.core.identification.motions.motion_models import MODELS
 from ftproc.core.impact import heights
-from ftproc.core.model.forces import EARTH_M, GRAVITY
+from ftproc.core.model.forces import GRAVITY
 from ftproc.core.model.frames import from_cartesian
+from ftproc.core.model.motion import EARTH_M
 from ftproc.derived.extremes import extremes
 from ftproc.derived.impact import figures
 from ftproc.files.reading import trajectories

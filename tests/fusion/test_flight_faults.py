@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ftproc.core.identification.motions.motion_models import ONLY_WHITE, Candidates
 from ftproc.files.writing import ranges
 from ftproc.fusion import flight, range_file
 from ftproc.fusion.estimation import flight_faults
@@ -15,6 +16,8 @@ from ftproc.fusion.estimation.constants import Constants
 from ftproc.fusion.estimation.events import APART_M, OFFSET, SCALE
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate_range
+
+EITHER = Candidates(("white-jerk", "orbital"))
 
 
 def current(used=(0.9, 0.9), possible=(1, 1), noise=1.0, unexamined=0):
@@ -44,16 +47,16 @@ def test_stations_contradict_each_other_where_one_that_takes_part_is_rejected_or
     assert flight_faults._contradict(current(**changed)) is contradict
 
 
-@pytest.mark.parametrize(("contradict", "expected"), [(True, ("white-jerk",)), (False, ("white-jerk", "orbital"))])
+@pytest.mark.parametrize(("contradict", "expected"), [(True, ONLY_WHITE), (False, EITHER)])
 def test_stations_that_contradict_each_other_tell_no_motion(monkeypatch, contradict, expected):
     found, asked = SimpleNamespace(unexamined=1, stations=[], weight=[]), []
     monkeypatch.setattr(flight_faults, "_contradict", lambda _: contradict)
     monkeypatch.setattr(flight_faults, "_explained", lambda readings, *_: (readings, found))
     monkeypatch.setattr(flight_faults.lasting.Readings, "of", lambda _: None)
     monkeypatch.setattr(flight_faults.beside, "fitted", lambda flight, *_: flight)
-    monkeypatch.setattr(flight_faults.engine, "last", lambda flight, names: asked.append(names) or flight)
+    monkeypatch.setattr(flight_faults.engine, "last", lambda flight, among: asked.append(among) or flight)
     found.events, found._replace = SimpleNamespace(time_s=np.zeros(3)), lambda **_: found
-    assert flight_faults.fuse([], 3.0, None, ("white-jerk", "orbital"), None, print) is found
+    assert flight_faults.fuse([], 3.0, None, EITHER, None, print) is found
     assert asked == [expected]
 
 

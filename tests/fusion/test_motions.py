@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ftproc.core.identification.motions.motion_models import MARGIN, MODELS, WHITE
+from ftproc.core.identification.motions.motion_models import MARGIN, MODELS, WHITE, Candidates
 from ftproc.core.model.frames import from_cartesian
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
@@ -35,7 +35,7 @@ def stations(flight, tmp_path_factory):
 
 
 def fused(stations, *names, smooth=True):
-    return whole.fuse(stations, FilterSettings().gate, None, smooth, lambda done, most: None, names)
+    return whole.fuse(stations, FilterSettings().gate, None, smooth, lambda done, most: None, Candidates(names))
 
 
 def velocity_error(found, flight, zero_s):

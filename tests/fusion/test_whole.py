@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.biases import PARAMETERS
+from ftproc.core.identification.motions.motion_models import ONLY_WHITE
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
 from ftproc.fusion.estimation import engine, flight_faults, whole
@@ -105,7 +106,7 @@ def test_what_other_stretches_have_said_narrows_the_biases(stations):
                               measurement=each.measurement[slice(*np.searchsorted(each.time_s, ends))],
                               accepted=each.accepted[slice(*np.searchsorted(each.time_s, ends))])
                 for each in stations]  # fmt: skip
-        return flight_faults.fuse(part, FilterSettings().gate, None, ("white-jerk",), known, lambda number: None)
+        return flight_faults.fuse(part, FilterSettings().gate, None, ONLY_WHITE, known, lambda number: None)
 
     nothing = Likelihood.nothing(PARAMETERS * len(stations))
     first, alone = half(nothing, 0.0, 30.0), half(nothing, 30.0, 61.0)

@@ -1,6 +1,6 @@
 """The forces on what flies: how the acceleration turns, grows and falls with the motion, beside its white jerk.
 
-With g(p) the gravity of a round earth, W the earth's rotation, and D = a - g + 2 W x v the specific force,
+With g(p) the earth's gravity, W its rotation, and D = a - g + 2 W x v the specific force,
 
     a' = G v - 2 W x a - W x (W x v) + w x D + b (2 v.a / s^2 - climb / H) D + white jerk
     w = v x a / s^2      s^2 = v^2 + v0^2      G = dg/dp      b = max(-D.v / (|D| s), 0)
@@ -8,6 +8,7 @@ With g(p) the gravity of a round earth, W the earth's rotation, and D = a - g + 
 The specific force of an aircraft turns with its velocity (w x D). What brakes also grows with the square of the speed
 and falls with the density of the air; b is its share of the force, so that a motor, the wings of an aircraft and the
 bomb that it drops follow one law. v0 lets the turn fade in hover and at rest. A model of motion is a choice of these.
+The earth is round and has the gravity of its surface; where it turns, see `gravity`.
 
 Over an interval T this is half a kick, the motion of constant acceleration, and half a kick (Strang splitting, of
 second order in T): a <- a + T/2 (f + J (x - x0)), linearised about the states x0 of a course on both sides of the
@@ -26,11 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part
-from ftproc.core.model.motion import Adjoint, Motion, noise_coefficients, predict
+from ftproc.core.model.gravity import MASS_M3PS2, flatten, rotate
+from ftproc.core.model.motion import EARTH_M, Adjoint, Motion, noise_coefficients, predict
 
 FloatArray = NDArray[np.float64]
 
-GRAVITY, EARTH_M = 9.80665, 6371008.8  # m/s2, and the radius of a round earth
+GRAVITY = 9.80665  # m/s2
 AT_REST_MPS = 3.0  # v0
 SCALE_HEIGHT_M = 8500.0  # H
 LEAST_FORCE = 1e-300  # m2/s4: of none, nothing is known
@@ -62,12 +64,13 @@ class Scored(Adjoint, Protocol):
 @part
 def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -> None:
     """Fill kick and push of a kick of h seconds at a state x (9,), whose acceleration has this variance."""
-    w0, w1, w2 = 2 * by.rotation[0, 0], 2 * by.rotation[0, 1], 2 * by.rotation[0, 2]
+    w0, w1, w2 = 2 * by.earth[0, 0], 2 * by.earth[0, 1], 2 * by.earth[0, 2]
+    spins = w0 != 0 or w1 != 0 or w2 != 0
     v0, v1, v2, a0, a1, a2 = x[3], x[4], x[5], x[6], x[7], x[8]
-    r0, r1, r2 = x[0], x[1], x[2] + EARTH_M
+    r0, r1, r2 = x[0] - by.earth[1, 0], x[1] - by.earth[1, 1], x[2] - by.earth[1, 2]
     ir2 = 1 / (r0 * r0 + r1 * r1 + r2 * r2)
     ir = math.sqrt(ir2)
-    pull = GRAVITY * EARTH_M * EARTH_M * ir2 * ir  # g = -pull r
+    pull = (MASS_M3PS2 if spins else GRAVITY * EARTH_M * EARTH_M) * ir2 * ir  # g = -pull r
     rv = r0 * v0 + r1 * v1 + r2 * v2
     d0 = a0 + pull * r0 + w1 * v2 - w2 * v1
     d1 = a1 + pull * r1 + w2 * v0 - w0 * v2
@@ -92,8 +95,9 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -
             s[i, j] += grows * (2 * i2 * a[j] - 4 * va * i2 * i2 * v[j] - ir * r[j] / SCALE_HEIGHT_M)
         s[i, 3 + i] += turns * vd + swell
         s[i, i] -= turns * ad + pull
-    if w0 != 0 or w1 != 0 or w2 != 0:
-        _rotate(f, x, w0, w1, w2, turns, swell)
+    if spins:
+        rotate(f, x, w0, w1, w2, turns, swell)
+        flatten(f, x, r, by)
     for i in range(3):  # h (1 + h/2 da) (f - J x) and h (1 + h/2 da) J, to second order
         for j in range(3):
             f.push[i] -= s[i, j] * v[j] + s[i, 3 + j] * a[j]
@@ -104,21 +108,6 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -
         f.push[i] = h * (f.push[i] + (e0 * p0 + e1 * p1 + e2 * p2))
         for j in range(6):
             b[i, j] = h * (s[i, j] + (e0 * s[0, j] + e1 * s[1, j] + e2 * s[2, j]))
-
-
-@part
-def _rotate(f: Forced, x: FloatArray, w0: float, w1: float, w2: float, turns: float, swell: float) -> None:
-    """Add the apparent forces of a turning earth, whose rotation is half of w, to slope and push."""
-    s, v, a = f.slope, (x[3], x[4], x[5]), (x[6], x[7], x[8])
-    spin = ((0.0, -w2, w1), (w2, 0.0, -w0), (-w1, w0, 0.0))
-    for i in range(3):
-        for j in range(3):
-            f.push[i] -= spin[i][j] * a[j]
-            s[i, 3 + j] -= spin[i][j]
-            s[i, j] += swell * spin[i][j]
-            for k in range(3):
-                s[i, j] += (turns * (a[i] * v[k] - v[i] * a[k]) - 0.25 * spin[i][k]) * spin[k][j]
-                f.push[i] -= 0.25 * spin[i][k] * spin[k][j] * v[j]
 
 
 @part

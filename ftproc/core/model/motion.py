@@ -24,6 +24,8 @@ from ftproc.core.signatures import Cube, Matrix, Vector
 FloatArray = NDArray[np.float64]
 
 FOREVER_S = 1e300  # correlation time of an offset that stays as it is
+EARTH_M = 6371008.8  # radius of a round earth
+STILL = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -EARTH_M]])  # an earth below a station of which no more is known
 
 
 class Moving(Protocol):
@@ -51,13 +53,14 @@ def isotropic(jerk_psd: float) -> FloatArray:
 class Motion(NamedTuple):
     """A model of motion, whose formulas are in `forces`. acts: whether there are forces at all; without, the densities
     of the jerk are along x, y and z, else along the path, across it, and upward. turns, pressed: shares of the force
-    that turns with the velocity, and that grows with the pressure of the air. rotation: (1, 3) of the earth, rad/s.
-    course: (n, 9) the states of the samples about which it is linearised; without rows, about the estimate itself."""
+    that turns with the velocity, and that grows with the pressure of the air. earth: its rotation, rad/s, zero where it
+    is not known, and its centre, m. course: (n, 9) the states of the samples about which it is linearised; without
+    rows, about the estimate itself."""
 
     acts: bool = False
     turns: float = 0.0
     pressed: float = 0.0
-    rotation: Matrix = np.zeros((1, 3))
+    earth: Matrix = STILL
     course: Matrix = np.zeros((0, 9))
 
     def about(self, course: FloatArray) -> Motion:

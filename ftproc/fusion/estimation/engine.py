@@ -18,6 +18,7 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.identification.likelihood import fit_jerk
+from ftproc.core.identification.motions.motion_models import Candidates
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
@@ -251,14 +252,14 @@ def at(current: Current, constants: Constants) -> Current:
     return current._replace(events=events, constants=constants, start=start, found=found)
 
 
-def last(current: Current, names: tuple[str, ...]) -> Current:
-    """The run to publish: with a little more process noise than is likeliest, and the likeliest motion. names: of the
+def last(current: Current, among: Candidates) -> Current:
+    """The run to publish: with a little more process noise than is likeliest, and the likeliest motion. among: the
     models of motion to choose from."""
     if math.isfinite(current.model.knot_s):
         log, begun = current.log, motions.on_knots(current.log, current.model)
         current = current._replace(model=with_allowance(log, fit_profile(log, [current.start], begun, LAST_STEPS)))
     current = _smoothed(_smoothed(current))
     known = np.any([np.isfinite(station.known) for station in current.stations], 0)
-    motion, model = motions.choose(current.log, current.start, current.model, names, known)
+    motion, model = motions.choose(current.log, current.start, current.model, among, known)
     current = current._replace(motion=motion, model=model)
     return _smoothed(_smoothed(current)) if model.motion.acts or motion.abrupt_s else current

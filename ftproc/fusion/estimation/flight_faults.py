@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.scanned import MARGIN, PRIOR
 from ftproc.core.editing.patch_likelihood import log_probability_of_all
-from ftproc.core.identification.motions.motion_models import WHITE
+from ftproc.core.identification.motions.motion_models import ONLY_WHITE, WHITE, Candidates
 from ftproc.core.identification.profile import roughness
 from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import beside, engine, jumps_beside, lasting
@@ -38,10 +38,10 @@ Settle = Callable[[Readings], Current]
 
 
 def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, names: tuple[str, ...], known: Likelihood,
+    stations: list[Seen], gate: float, jerk_psd: float | None, among: Candidates, known: Likelihood,
     progress: Callable[[int], None], stretch: bool = False,
 ) -> Current:  # fmt: skip
-    """The fused flight, or a stretch of a longer one, in all of which the biases have one prior. names: of the models
+    """The fused flight, or a stretch of a longer one, in all of which the biases have one prior. among: the models
     of motion to choose from. known: what others have said. progress: takes each round. Raises Alone."""
     settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
     readings, current = _explained(Readings.of(stations), settle, stretch)
@@ -59,9 +59,9 @@ def fuse(
         if lasting.contradicted(without.stations, without.weight):
             break
         current = without._replace(steps=readings.steps)
-    if WHITE in names and _contradict(current):
-        names = (WHITE,)  # no motion can be told
-    current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)), names)
+    if WHITE in among.names and _contradict(current):
+        among = ONLY_WHITE  # no motion can be told
+    current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)), among)
     return current._replace(unexamined=current.unexamined + work.passed)
 
 

@@ -17,6 +17,7 @@ from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, residuals_beside, smooth_log
 from ftproc.core.identification.motions import motion_models
+from ftproc.core.identification.motions.motion_models import Candidates
 from ftproc.core.identification.profile import knot_length
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.moving import between
@@ -40,11 +41,10 @@ class Motive(NamedTuple):
 
 
 def choose(
-    log: Observations, start: Start, white: Model, names: tuple[str, ...], known: NDArray[np.bool_]
+    log: Observations, start: Start, white: Model, among: Candidates, known: NDArray[np.bool_]
 ) -> tuple[Motive, Model]:
-    """The likeliest motion of these names, and the model with it. white: as in `motion_models.choose`; known: (3,)
-    components whose noise the user has specified."""
-    found = motion_models.choose(log, [start], white, names, known)
+    """The likeliest motion, and the model with it. white, among, known: as in `motion_models.choose`."""
+    found = motion_models.choose(log, [start], white, among, known)
     return Motive(found.name, found.gain, tuple(found.abrupt_s())), found.model
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ftproc.core import impact
 from ftproc.core.filtering.records import FilterRun, Model, Start
 from ftproc.core.filtering.smoother import SmootherRun
-from ftproc.core.identification.motions import motion_models
+from ftproc.core.identification.motions.motion_models import ONLY_WHITE, Candidates
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine, flight_faults, lasting, motions
@@ -87,12 +87,12 @@ class Stretch(NamedTuple):
 
 def fuse(
     stations: list[Seen], gate: float, jerk_psd: float | None, smooth: bool, progress: Callable[[int, int], None],
-    names: tuple[str, ...] = (motion_models.WHITE,),
+    among: Candidates = ONLY_WHITE,
 ) -> Fused:  # fmt: skip
     """The fused flight of two or more stations. smooth: whether the track is smoothed, or filtered with the decisions
     and the biases of the whole flight. progress is called with the rounds that are done, and the most there may be.
-    names: of the models of motion to choose from. Raises engine.Alone."""
-    run = functools.partial(_fused, gate=gate, jerk_psd=jerk_psd, smooth=smooth, progress=progress, names=names)
+    among: the models of motion to choose from. Raises engine.Alone."""
+    run = functools.partial(_fused, gate=gate, jerk_psd=jerk_psd, smooth=smooth, progress=progress, among=among)
     fused = run(stations)
     if (others := lasting.with_biases(stations, fused.steps)) is not None:
         fused = run(others)
@@ -102,7 +102,7 @@ def fuse(
 
 def _fused(
     stations: list[Seen], gate: float, jerk_psd: float | None, smooth: bool, progress: Callable[[int, int], None],
-    names: tuple[str, ...],
+    among: Candidates,
 ) -> Fused:  # fmt: skip
     """The same, of what the range file says."""
     prior = np.stack([station.prior for station in stations])
@@ -119,7 +119,7 @@ def _fused(
         say = functools.partial(_say, progress, k * engine.MOST_ROUNDS, (len(edges) - 1) * engine.MOST_ROUNDS)
         try:
             said = known.of(parameters(seen))
-            current = flight_faults.fuse(there, gate, jerk_psd, names, said, say, stretch=len(edges) > 2)
+            current = flight_faults.fuse(there, gate, jerk_psd, among, said, say, stretch=len(edges) > 2)
         except engine.Alone:
             if len(edges) == 2:
                 raise

@@ -15,22 +15,36 @@ from ftproc.core.compiled import zeros
 from ftproc.core.filtering import forward, smoother
 from ftproc.core.filtering.filters import FILTER
 from ftproc.core.filtering.records import Start
-from ftproc.core.model import forces
-from ftproc.core.model.motion import Motion
+from ftproc.core.model import forces, gravity
+from ftproc.core.model.motion import EARTH_M, Motion
 from tests import naive
 from tests.core.tracks import matched
 
 UP = np.array([0.0, 0.0, 1.0])
 TURNING = Motion(acts=True, turns=1.0)
 PRESSED = Motion(acts=True, turns=1.0, pressed=1.0)
-SPUN = Motion(acts=True, rotation=np.array([[2e-5, 3e-5, 5e-5]]))
+SPUN = Motion(acts=True, earth=np.array([[2e-5, 3e-5, 5e-5], [1e4, -2e4, -6.36e6]]))
 
 
 def specific(x, by):
     """D of a state (9,), as the head of `forces` writes it."""
-    p = x[:3] + np.array([0, 0, forces.EARTH_M])
-    pull = forces.GRAVITY * forces.EARTH_M**2 / np.linalg.norm(p) ** 3
-    return x[6:] + pull * p + 2 * np.cross(by.rotation[0], x[3:6])
+    p = x[:3] - by.earth[1]
+    return x[6:] + mass(by) / np.linalg.norm(p) ** 3 * p + 2 * np.cross(by.earth[0], x[3:6])
+
+
+def mass(by):
+    """mu, or that of a round earth with the gravity of its surface."""
+    return gravity.MASS_M3PS2 if by.earth[0].any() else forces.GRAVITY * EARTH_M**2
+
+
+def flattening(p, w):
+    """What J2 adds to the gravity at p (3,) from the centre of an earth that turns with w (3,)."""
+    if not w.any():
+        return np.zeros(3)
+    r, n = np.linalg.norm(p), w / np.linalg.norm(w)
+    u = n @ p
+    size = -1.5 * gravity.FLATTENING * gravity.MASS_M3PS2 * gravity.EQUATOR_M**2 / r**5
+    return size * ((1 - 5 * u**2 / r**2) * p + 2 * u * n)
 
 
 def braked(x, by):
@@ -41,11 +55,13 @@ def braked(x, by):
 
 def force(x, by, share=None):
     """a' of a state (9,), as the head of `forces` writes it. share: b, where it is held."""
-    p, v, a = x[:3] + np.array([0, 0, forces.EARTH_M]), x[3:6], x[6:]
-    r, w = np.linalg.norm(p), by.rotation[0]
-    pull = forces.GRAVITY * forces.EARTH_M**2 / r**3
+    p, v, a = x[:3] - by.earth[1], x[3:6], x[6:]
+    r, w = np.linalg.norm(p), by.earth[0]
+    pull = mass(by) / r**3
     d, s2 = specific(x, by), v @ v + forces.AT_REST_MPS**2
     tide = -pull * (np.eye(3) - 3 * np.outer(p, p) / r**2) @ v - 2 * np.cross(w, a)
+    beside = 1e3 * np.eye(3)
+    tide += np.stack([flattening(p + d, w) - flattening(p - d, w) for d in beside]).T @ v / 2e3
     swells = 2 * v @ a / s2 - v @ p / r / forces.SCALE_HEIGHT_M
     share = braked(x, by) if share is None else share
     return tide + by.turns * np.cross(np.cross(v, a) / s2, d) + by.pressed * share * swells * d

@@ -42,6 +42,17 @@ LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less
 JERK_SHARES = 10.0 ** -np.arange(8)  # of the jerk of white jerk: where the search begins for a body that nobody steers
 
 
+class Candidates(NamedTuple):
+    """The models of motion to choose from, by their names in MODELS, and (2, 3) the earth of a `Motion`, where the site
+    of the station is known; it has to be found otherwise."""
+
+    names: tuple[str, ...]
+    earth: FloatArray | None = None
+
+
+ONLY_WHITE = Candidates((WHITE,))
+
+
 class Chosen(NamedTuple):
     """The motion of a log.
 
@@ -98,27 +109,28 @@ def of_rows(run: Run, row: IntArray | None) -> Run:
 
 
 def choose(
-    log: Observations, starts: list[Start], white: Model, names: tuple[str, ...], known: NDArray[np.bool_] = NOTHING
+    log: Observations, starts: list[Start], white: Model, among: Candidates, known: NDArray[np.bool_] = NOTHING
 ) -> Chosen:
-    """The likeliest motion of a log of these names, with abrupt changes where it tells some. white: the model with
-    white jerk, whose profile has its allowance. known: (3,) which noise the user has specified.
+    """The likeliest motion of a log, with abrupt changes where it tells some. white: the model with white jerk, whose
+    profile has its allowance. known: (3,) which noise the user has specified.
 
     A single name is taken without asking how likely it is; of white jerk, without abrupt changes.
     """
-    if not [name for name in names if name != WHITE]:
+    if not [name for name in among.names if name != WHITE]:
         return Chosen(WHITE, white, 0.0, log, starts, white)
-    found = _chosen(log, starts, white, names, known)
+    found = _chosen(log, starts, white, among, known)
     with_changes = jolts.told(log, starts, white)
     if with_changes is None:
         return found
-    other = _chosen(log, starts, with_changes, names, known)
+    other = _chosen(log, starts, with_changes, among, known)
     return other if other.log_probability() > found.log_probability() + jolts.SURE else found
 
 
 def _chosen(
-    log: Observations, starts: list[Start], white: Model, names: tuple[str, ...], known: NDArray[np.bool_]
+    log: Observations, starts: list[Start], white: Model, among: Candidates, known: NDArray[np.bool_]
 ) -> Chosen:
-    others = [name for name in names if name != WHITE]
+    names = among.names
+    others = among._replace(names=tuple(name for name in names if name != WHITE))
     fitted, short, course = _fitted(log, starts, white, others, known)
     best = max(fitted, key=lambda each: _finite(each.gain))
     other = Chosen(WHITE, white, best.gain, log, starts, white)
@@ -130,7 +142,7 @@ def _chosen(
 
 
 def _fitted(
-    log: Observations, starts: list[Start], white: Model, names: list[str], known: NDArray[np.bool_]
+    log: Observations, starts: list[Start], white: Model, others: Candidates, known: NDArray[np.bool_]
 ) -> tuple[list[Chosen], Observations, FloatArray]:
     """Each of these models, fitted to the log with neighbours merged; this log, and the course (m, 9) along it."""
     scales = scales_of(log, white.noise_variance)
@@ -145,6 +157,7 @@ def _fitted(
         short = Logged(*with_steps(short.log, short.starts, course, turn)[:2], scales)
         course = smooth_log(short.log, white, short.starts).state
     found = list[Chosen]()
+    names = others.names
     for name in names:
         motion = MODELS[name]
         if len(names) > 1 and not _may_be(name, course):
@@ -152,7 +165,7 @@ def _fitted(
         begin = likeliest._replace(motion=motion.about(course))
         if name == ORBITAL:
             model, likelihood = orbits.fit(
-                orbits.Track(*short[:2], known), begin, base if len(names) > 1 else -math.inf
+                orbits.Track(*short[:2], known, others.earth), begin, base if len(names) > 1 else -math.inf
             )
         else:
             model, likelihood = (_unsteered if motion.pressed else _steered)(short, begin)

@@ -2,12 +2,13 @@
 
 Of such a track white jerk takes what gravity does between two readings for noise: a satellite whose ranges are read
 every few minutes to 4 m shows 1,400 m. With gravity the noise is fitted again, beside a single level of the jerk. How
-the earth turns below the station nobody has said: its latitude, and where north is, are those by which the log is
-likeliest.
+the earth turns below the station is known by its site, or else by the latitude, and the north, with which the log is
+likeliest; these also tell where the earth's centre is, up to 21 km from below the station.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -19,13 +20,14 @@ from ftproc.core.filtering.smoother import likelihood_of, score_log, smooth_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import RATIO_BOUND, of_level, shaped
 from ftproc.core.identification.profile import median_level
-from ftproc.core.model.forces import EARTH_M
-from ftproc.core.model.motion import Motion
+from ftproc.core.model.earth import ECCENTRICITY2, RADIUS_M, Geodetic
+from ftproc.core.model.motion import EARTH_M, Motion
 from ftproc.records import FloatArray
 
 ABOVE_M = 100e3  # where the air ends
 FARTHEST_TURN = 0.005  # rad, over which the motion goes on in one step
 EARTH_RADPS = 7.292115e-5  # its rotation
+UP = np.array([0.0, 0.0, 1.0])
 LATITUDES, NORTHS = np.radians([-60, -30, 0, 30, 60]), np.radians(np.arange(0, 360, 45))
 LESS_JERK = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
 STARTS = 2  # latitudes from which it is searched on: the track that comes of white jerk may be far off
@@ -39,11 +41,12 @@ FARTHEST = 12.0, 25.0  # ln of times: less noise variance, and less jerk, than w
 
 
 class Track(NamedTuple):
-    """A log with its starts, and (3,) which noise the user has specified."""
+    """A log with its starts, (3,) which noise the user has specified, and (2, 3) the earth, None if it is unknown."""
 
     log: Observations
     starts: list[Start]
     known: NDArray[np.bool_]
+    earth: FloatArray | None
 
     def likelihood(self, model: Model) -> float:
         """The log-likelihood; a model with which the filter diverges is impossible."""
@@ -68,15 +71,15 @@ def fit(track: Track, model: Model, rival: float = -math.inf) -> tuple[Model, fl
     if (likelihood := track.likelihood(still)) < rival - HOPELESS:
         return still, likelihood
 
-    def turning(latitude: float, north: float, times: float) -> Model:
-        rotation = _rotation(np.array([latitude, north]))
-        return still._replace(jerk=times * still.jerk, motion=still.motion._replace(rotation=rotation))
+    def turning(earth: FloatArray, times: float) -> Model:
+        return still._replace(jerk=times * still.jerk, motion=still.motion._replace(earth=earth))
 
-    likeliest = [
-        max((turning(latitude, north, times) for north in NORTHS for times in LESS_JERK), key=track.likelihood)
-        for latitude in LATITUDES
-    ]
-    first = sorted(likeliest, key=track.likelihood)[-STARTS:]
+    if track.earth is not None:
+        tried = [turning(track.earth, times) for times in LESS_JERK]
+        best = max((_settled(track, _settled(track, each)) for each in tried), key=track.likelihood)
+        return best, track.likelihood(best)
+    earths = [earth_below(*each) for each in itertools.product(LATITUDES, NORTHS)]
+    first = [max((turning(earth, times) for earth in earths), key=track.likelihood) for times in LESS_JERK]
     found = [still, *(_until_settled(track, each) for each in first)]
     best = max(found, key=track.likelihood)
     return best, track.likelihood(best)
@@ -93,16 +96,27 @@ def _until_settled(track: Track, model: Model) -> Model:
     return model
 
 
-def _rotation(direction: FloatArray) -> FloatArray:
-    """(1, 3) rad/s along x, y and z at a latitude, with north at an angle from x: (2,) rad."""
-    latitude, north = direction.tolist()
-    level = math.cos(latitude)
-    return EARTH_RADPS * np.array([[level * math.cos(north), level * math.sin(north), math.sin(latitude)]])
+def earth_below(latitude: float, north: float, height_m: float = 0.0) -> FloatArray:
+    """(2, 3) the earth of a `Motion` below a station at a latitude (rad), with north at an angle from x (rad)."""
+    sine, cosine = math.sin(latitude), math.cos(latitude)
+    normal_m = RADIUS_M / math.sqrt(1 - ECCENTRICITY2 * sine**2)
+    level = np.array([math.cos(north), math.sin(north), 0.0])
+    turn = EARTH_RADPS * (cosine * level + sine * UP)
+    away = normal_m * ECCENTRICITY2 * sine * cosine * level
+    return np.array([turn, away - (normal_m * (1 - ECCENTRICITY2 * sine**2) + height_m) * UP])
 
 
-def _direction(rotation: FloatArray) -> FloatArray:
-    """The inverse of `_rotation`."""
-    x, y, z = rotation[0].tolist()
+def earth_from(site: Geodetic, north: int) -> FloatArray:
+    """(2, 3) the same below a site of which the axis `north` (0: x, 1: y) points there and the other one to the east.
+    Of axes in the order of a left hand the rotation, an axial vector, is reversed."""
+    found = earth_below(math.radians(site[0]), math.pi / 2 * north, site[2])
+    found[0] *= 2 * north - 1
+    return found
+
+
+def _direction(earth: FloatArray) -> FloatArray:
+    """The latitude and the north of `earth_below`, (2,)."""
+    x, y, z = earth[0].tolist()
     return np.array([math.atan2(z, math.hypot(x, y)), math.atan2(y, x)])
 
 
@@ -133,9 +147,9 @@ def _turned(track: Track, model: Model) -> Model:
     best, likelihood = model, track.likelihood(model)
     angles = np.diff(LATITUDES)[0] * np.eye(2) / 2
     for _ in range(TURNS):
-        here = _direction(best.motion.rotation)
+        here = _direction(best.motion.earth)
         tried = [
-            best._replace(motion=best.motion._replace(rotation=_rotation(here + side * angle)))
+            best._replace(motion=best.motion._replace(earth=earth_below(*(here + side * angle))))
             for angle in angles
             for side in (1, -1)
         ]

@@ -12,7 +12,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.motions import motion_models
-from ftproc.core.identification.motions.motion_models import MODELS, WHITE, choose, with_steps
+from ftproc.core.identification.motions.motion_models import MODELS, WHITE, Candidates, choose, with_steps
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.motion import isotropic
 from ftproc.methods import preparing
@@ -69,7 +69,7 @@ def fitted(a):
 def test_a_flight_of_white_jerk_stays_one(seed):
     a = matched(seed, 400, dt=0.2, q=3.0)
     model, log = fitted(a), a.log
-    found = choose(log, a.starts, model, tuple(MODELS))
+    found = choose(log, a.starts, model, Candidates(tuple(MODELS)))
     assert found.name == WHITE
     assert found.gain < motion_models.MARGIN
     assert found.model is model
@@ -86,14 +86,14 @@ def test_a_motion_that_is_about_as_likely_is_a_rival(monkeypatch):
     starts = find_starts(a, noise, 100.0)
     white = with_allowance(a, fit_profile(a, starts, white, 3))
     names = (WHITE, "turning-force")
-    assert choose(a, starts, white, names).rival is None  # far likelier
+    assert choose(a, starts, white, Candidates(names)).rival is None  # far likelier
     monkeypatch.setattr(motion_models, "CLOSE", np.inf)
-    found = choose(a, starts, white, names)
+    found = choose(a, starts, white, Candidates(names))
     assert (found.name, found.rival.name) == ("turning-force", WHITE)
     monkeypatch.setattr(motion_models, "MARGIN", np.inf)
-    found = choose(a, starts, white, names)
+    found = choose(a, starts, white, Candidates(names))
     assert (found.name, found.rival.name) == (WHITE, "turning-force")
-    assert choose(a, starts, white, ("turning-force",)).rival is None
+    assert choose(a, starts, white, Candidates(("turning-force",))).rival is None
 
 
 def test_sigmas_allow_for_a_rival(monkeypatch):
@@ -111,16 +111,18 @@ def test_sigmas_allow_for_a_rival(monkeypatch):
 
 def test_a_single_name_is_taken():
     a = matched(1, 200, dt=0.2, q=3.0)
-    found = choose(a.log, a.starts, fitted(a), ("turning-force",))
+    found = choose(a.log, a.starts, fitted(a), Candidates(("turning-force",)))
     assert found.name == "turning-force"
     assert found.gain < 0
     assert found.model.motion.acts
 
 
 def test_a_jerk_that_is_specified_is_white():
-    assert preparing.motions(SMOOTH) == tuple(MODELS)
-    assert preparing.motions(replace(SMOOTH, jerk_psd_m2ps5=1.0)) == (WHITE,)
-    assert preparing.motions(replace(SMOOTH, jerk_psd_m2ps5=1.0, motion="turning-force")) == ("turning-force",)
+    assert preparing.motions(SMOOTH, None).names == tuple(MODELS)
+    assert preparing.motions(replace(SMOOTH, jerk_psd_m2ps5=1.0), None).names == (WHITE,)
+    assert preparing.motions(replace(SMOOTH, jerk_psd_m2ps5=1.0, motion="turning-force"), None).names == (
+        "turning-force",
+    )
     assert (AUTO, *MODELS) == MOTIONS
 
 

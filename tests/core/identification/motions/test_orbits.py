@@ -10,14 +10,15 @@ from scipy.integrate import solve_ivp
 
 from ftproc import pipeline
 from ftproc.core.identification.motions import orbits
-from ftproc.core.identification.motions.orbits import EARTH_RADPS, _direction, _rotation
+from ftproc.core.identification.motions.orbits import EARTH_RADPS, _direction, earth_below, earth_from
+from ftproc.core.model.earth import earth_centred, verticals
 from ftproc.core.model.frames import from_cartesian
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
 
 pytestmark = pytest.mark.compiled
 
-EARTH_M, EQUATOR_M, MU_M3PS2, J2 = 6371008.8, 6378137.0, 3.986004418e14, 1.08263e-3
+EQUATOR_M, MU_M3PS2, J2 = 6378137.0, 3.986004418e14, 1.08263e-3
 LOWEST_RAD = 0.14  # over the horizon
 SMOOTH = FilterSettings(smooth=True)
 #: height m, s of a pass, s between readings, 1-sigma m and rad, share of outliers in range (where readings are minutes
@@ -30,16 +31,23 @@ PASSES = [
 ]
 
 
-def passed(draw, height_m, lasts_s, dt_s, range_m, angle_rad, outliers):
-    """A log with outliers in range, and its truth (n, 6)."""
-    latitude, north, along, off = draw.uniform((-1.0, 0.0, 0.0, -0.1), (1.2, 6.3, 6.3, 0.1))
-    turn = EARTH_RADPS * np.array(
-        [np.cos(latitude) * np.cos(north), np.cos(latitude) * np.sin(north), np.sin(latitude)]
-    )
+def below(site, north):
+    """(3,) the earth's rotation and (3,) its centre, as they are seen from a site with north at an angle from x."""
+    c, s = np.cos(north), np.sin(north)
+    axes = np.array([[s, -c, 0], [c, s, 0], [0, 0, 1]]).T  # east, north, up
+    return axes @ verticals(site) @ [0, 0, EARTH_RADPS], -axes @ verticals(site) @ earth_centred(site)
+
+
+def passed(draw, height_m, lasts_s, dt_s, range_m, angle_rad, outliers, north=None):
+    """A log with outliers in range, its truth (n, 6), and the site."""
+    latitude, anywhere, along, off = draw.uniform((-1.0, 0.0, 0.0, -0.1), (1.2, 6.3, 6.3, 0.1))
+    site = (np.degrees(latitude), 10.0, 300.0)
+    turn, centre = below(site, anywhere if north is None else north)
     axis = turn / EARTH_RADPS
     ahead, aside = np.array([np.cos(along), np.sin(along), 0]), np.array([-np.sin(along), np.cos(along), 0])
-    begin = (EARTH_M + height_m) * (np.cos(off) * np.array([0, 0, 1]) + np.sin(off) * aside)
-    speed = np.sqrt(MU_M3PS2 / (EARTH_M + height_m) * (1 + draw.uniform(0, 0.02)))
+    radius = np.linalg.norm(centre) + height_m
+    begin = radius * (np.cos(off) * np.array([0, 0, 1]) + np.sin(off) * aside)
+    speed = np.sqrt(MU_M3PS2 / radius * (1 + draw.uniform(0, 0.02)))
 
     def flow(_, state):
         x, v = state[:3], state[3:]
@@ -52,18 +60,18 @@ def passed(draw, height_m, lasts_s, dt_s, range_m, angle_rad, outliers):
     first = np.concatenate([begin, speed * ahead - np.cross(turn, begin)])
     sides = [solve_ivp(flow, (0, end), first, "DOP853", rtol=1e-11, dense_output=True).sol for end in (t[0], t[-1])]
     state = np.where(t < 0, sides[0](np.minimum(t, 0)), sides[1](np.maximum(t, 0))).T
-    state[:, 2] -= EARTH_M
+    state[:, :3] += centre
     reading = from_cartesian(state[:, :3])
     state, t, reading = (each[reading[:, 2] > LOWEST_RAD] for each in (state, t, reading))
     reading += draw.standard_normal(reading.shape) * [range_m, angle_rad, angle_rad]
     reading[draw.random(len(t)) < outliers, 0] += 50 * range_m
-    return MeasurementLog("a pass", t - t[0], reading, np.arange(len(t))), state
+    return MeasurementLog("a pass", t - t[0], reading, np.arange(len(t))), state, site
 
 
 @pytest.mark.parametrize("seed", range(len(PASSES)))
 def test_a_satellite_is_moved_by_gravity(seed):
     *what, nearer, slower = PASSES[seed]
-    log, truth = passed(np.random.default_rng(seed), *what)
+    log, truth, _ = passed(np.random.default_rng(seed), *what)
     white, found = (pipeline.filter_log(log, replace(SMOOTH, motion=motion)) for motion in ("white-jerk", "auto"))
     summary = found.metadata["summary"]
     assert summary["motion"] == "orbital"
@@ -75,17 +83,34 @@ def test_a_satellite_is_moved_by_gravity(seed):
     assert (np.sqrt(after / before) < (nearer, slower)).all()
 
 
-@pytest.mark.parametrize(("of", "seed", "farthest_m"), [(3, 53, 600), (2, 12, 4000)])
+@pytest.mark.parametrize(("of", "seed", "farthest_m"), [(3, 53, 600), (2, 12, 6000)])
 def test_the_course_about_which_gravity_is_followed_may_begin_far_off(of, seed, farthest_m):
     """Ranges in every third row, and without angles, of the later half of a pass: white jerk is 127 km off, and an
     orbit from one start of the earth's axis 170."""
-    log, truth = passed(np.random.default_rng(seed), *PASSES[of][:5], 0.0)
+    log, truth, _ = passed(np.random.default_rng(seed), *PASSES[of][:5], 0.0)
     measurement, row = log.measurement.copy(), np.arange(len(log))
     ranged = (row % 3 == 0) & (row > len(log) / 2)
     measurement[~ranged, 0], measurement[ranged, 1:] = np.nan, np.nan
     found = pipeline.filter_log(replace(log, measurement=measurement), SMOOTH)
     assert found.metadata["summary"]["motion"] == "orbital"
     assert np.abs(found.state[:, :3] - truth[:, :3]).max() < farthest_m
+
+
+def test_a_site_tells_how_the_earth_turns():
+    """Ranges of the later half of a pass, at 1,200 km. North is y, or with an azimuth from there, x."""
+    log, truth, site = passed(np.random.default_rng(1), *PASSES[1][:5], 0.0, north=np.pi / 2)
+    measurement = log.measurement.copy()
+    measurement[: len(log) // 2, 0] = np.nan
+    log = replace(log, measurement=measurement)
+    measurement = measurement.copy()
+    measurement[:, 1] = np.pi / 2 - measurement[:, 1]
+    settings = replace(SMOOTH, site=site)
+    found = pipeline.filter_log(log, SMOOTH), pipeline.filter_log(log, settings)
+    of_north = pipeline.filter_log(replace(log, measurement=measurement, frame="north-east-up"), settings)
+    np.testing.assert_allclose(of_north.state[:, [1, 0, 2]], found[1].state[:, :3], atol=2.0)
+    unknown, known = (np.abs(each.state[:, :3] - truth[:, :3]).max() for each in found)
+    assert known < unknown / 2
+    assert found[1].metadata["summary"]["motion"] == "orbital"
 
 
 def test_what_flies_in_the_air_is_in_no_orbit():
@@ -99,6 +124,18 @@ def test_what_flies_in_the_air_is_in_no_orbit():
 
 @pytest.mark.parametrize("direction", [(0.7, 1.2), (-1.0, -2.0), (0.0, 3.0)])
 def test_directions_of_the_earths_axis(direction):
-    rotation = _rotation(np.array(direction))
-    assert np.linalg.norm(rotation) == pytest.approx(EARTH_RADPS)
-    np.testing.assert_allclose(_direction(rotation), direction, atol=1e-12)
+    earth = earth_below(*direction, 250.0)
+    np.testing.assert_allclose(_direction(earth), direction, atol=1e-12)
+    turn, centre = below((np.degrees(direction[0]), 77.0, 250.0), direction[1])
+    np.testing.assert_allclose(earth[0], turn, atol=1e-18)
+    np.testing.assert_allclose(earth[1], centre, atol=1e-6)
+
+
+@pytest.mark.parametrize("north", [0, 1])
+def test_the_earth_below_a_site(north):
+    """An axial vector changes its sign with the hand of the axes: with it, what turns eastward does."""
+    earth = earth_from((50.0, 10.0, 100.0), north)
+    off = np.array([1e3, 2e3, 3e3]) - earth[1]
+    east = np.eye(3)[1 - north]
+    assert np.cross(earth[0], off) @ east == pytest.approx(np.linalg.norm(np.cross(earth[0], off)), rel=1e-3)
+    assert np.linalg.norm(earth[1]) == pytest.approx(np.linalg.norm(earth_centred((50.0, 10.0, 100.0))))
