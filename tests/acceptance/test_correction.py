@@ -35,6 +35,7 @@ def test_servo_circles_and_range_walk_are_learned():
     assert max(ratios) / min(ratios) <= 1.2
 
 
+@pytest.mark.slow
 def test_a_repeatable_elevation_bias_is_taken_out_of_filter_and_smoother():
     found = result(replace(CASES["b"], training=8, duration_s=60.0), new=3, settings=QUICK)
     assert {s.features.name for s in found.model.stages.values()} == {"instrument"}

@@ -113,6 +113,7 @@ def test_a_fault_is_in_one_station(fault: str) -> None:
             assert (np.diff(after.log.time_s) >= 0).all()
 
 
+@pytest.mark.slow
 def test_a_step_of_one_station_is_told_from_the_same_flight_without_it() -> None:
     (run,) = fused_faults.run(("elevation-50",), "range-radar", 0)
     assert run.ratio < 1.2

@@ -132,7 +132,7 @@ def floods(flight):
         yield np.concatenate([t[:100], times, times[-1] + t[1:60]]), np.vstack([z[:100], many[: len(times)], z[1:60]])
 
 
-@pytest.mark.parametrize("way", ["live", "lag", "forward"])
+@pytest.mark.parametrize("way", ["live", pytest.param("lag", marks=pytest.mark.slow), "forward"])
 @pytest.mark.parametrize("number", range(4))
 def test_floods_are_counted_out_and_do_not_depend_on_how_rows_come(flight, monkeypatch, way, number):
     times, readings = list(floods(flight))[number]
