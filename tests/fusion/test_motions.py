@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from ftproc.core.identification.motions import motion_models
 from ftproc.core.identification.motions.motion_models import MARGIN, MODELS, WHITE, Candidates
 from ftproc.core.model.frames import from_cartesian
 from ftproc.files.writing import ranges
@@ -68,6 +70,23 @@ def test_a_gap_of_all_stations_is_crossed_in_steps(stations, flight, smooth):
     assert np.isfinite(found.track.state).all()
     gap = np.diff(found.track.time_s).max()
     assert GAP_S[1] - GAP_S[0] - 1 < gap < GAP_S[1] - GAP_S[0] + 1
+
+
+@pytest.mark.parametrize("better", [True, False])
+def test_a_motion_that_the_filter_does_not_follow_gives_way_to_white_jerk(stations, monkeypatch, better):
+    """The smoother keeps its own."""
+    real = motions.filtered
+
+    def rated(log, model, *there):
+        run = real(log, model, *there)
+        return run._replace(log_likelihood=run.log_likelihood + (1e4 if model.motion.acts == better else 0.0))
+
+    monkeypatch.setattr(motions, "filtered", rated)
+    monkeypatch.setattr(motion_models, "MARGIN", -math.inf)
+    smoothed, filtered = (fused(stations[0], WHITE, "turning-force", smooth=smooth) for smooth in (True, False))
+    assert [name for (name, _, _), _ in smoothed.motions] == ["turning-force"]
+    assert [name for (name, _, _), _ in filtered.motions] == ["turning-force" if better else WHITE]
+    assert np.isfinite(filtered.track.state).all()
 
 
 def test_states_between_are_those_of_a_constant_acceleration():

@@ -18,7 +18,7 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.identification.likelihood import fit_jerk
-from ftproc.core.identification.motions.motion_models import Candidates
+from ftproc.core.identification.motions.motion_models import WHITE, Candidates
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
@@ -44,7 +44,8 @@ class Current(NamedTuple):
     """What is accepted now. events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start;
     found: the smoother's run that the rest belongs to; own (m, 3): the noise that each component shows alone;
     rounds, settled: of the decisions; unexamined: intervals where no work was left to look for other hypotheses; steps:
-    that were taken out of the readings; motion: of the model."""
+    that were taken out of the readings; motion: of the model; white: the model with white jerk, where others were
+    tried, see `last`."""
 
     stations: list[Seen]
     events: Events
@@ -62,6 +63,7 @@ class Current(NamedTuple):
     unexamined: int = 0
     steps: tuple[lasting.Step, ...] = ()
     motion: motions.Motive = motions.Motive()
+    white: Model | None = None
 
     @property
     def log(self) -> Observations:
@@ -261,5 +263,19 @@ def last(current: Current, among: Candidates) -> Current:
     current = _smoothed(_smoothed(current))
     known = np.any([np.isfinite(station.known) for station in current.stations], 0)
     motion, model = motions.choose(current.log, current.start, current.model, among, known)
-    current = current._replace(motion=motion, model=model)
+    current = current._replace(motion=motion, model=model, white=current.model if WHITE in among.names else None)
     return _smoothed(_smoothed(current)) if model.motion.acts or motion.abrupt_s else current
+
+
+def as_filtered(current: Current) -> Current:
+    """The same with white jerk, if a filter, which knows no course but its own estimate, follows that better."""
+    motion, white = current.motion, current.white
+    if white is None or not current.model.motion.acts:
+        return current
+    there = current.start, current.found.run.state
+    by_motion, by_white = (
+        motions.filtered(current.log, model, *there).log_likelihood for model in (current.model, white)
+    )
+    if by_white <= by_motion:
+        return current
+    return current._replace(model=white, motion=motions.Motive(gain=motion.gain))

@@ -167,6 +167,8 @@ def _say(progress: Callable[[int, int], None], before: int, most: int, number: i
 
 def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, smooth: bool) -> Fused:
     """The stretches one after the other; smoothed with these biases if they are several."""
+    if not smooth:
+        found = [each._replace(current=engine.as_filtered(each.current)) for each in found]
     sizes = [len(station.time_s) for station in stations]
     weight, possible, residual, variance, position = ([np.full((n, 3), np.nan) for n in sizes] for _ in range(5))
     beside = tuple({side.name: Aside.before(side) for side in _measured(station)} for station in stations)
@@ -205,7 +207,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         max(each.current.rounds for each in found), all(each.current.settled for each in found),
         sum(each.current.unexamined for each in found),
         tuple(step for each in found for step in each.current.steps), beside, tuple(chosen),
-        _last(found[-1].current, best),
+        _last(current, best),
     )  # fmt: skip
 
 
