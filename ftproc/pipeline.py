@@ -15,8 +15,9 @@ from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.derived import impact
 from ftproc.errors import InputError, UsageError
 from ftproc.long_records import joined
-from ftproc.methods import heights, registry, scalars, simultaneous
+from ftproc.methods import registry, scalars, simultaneous
 from ftproc.methods.estimate import Estimate, Part
+from ftproc.methods.height import heights
 from ftproc.quality import beside, by_hand, next_steps, provenance, sanity
 from ftproc.quality.next_steps import Step
 from ftproc.quality.statistics import RunStatistics

@@ -75,7 +75,7 @@ class FilterSettings:
     parameters: (name, value) pairs of the method; `ftproc filter --list-methods NAME` explains them.
     lag_s: of live editing: the estimate at t rests on readings up to t + lag_s seconds, and no later one.
     height: of the target above the station, m, and its 1-sigma, where no elevation is measured; None: by the log's
-        heights, else a prior, see `ftproc.methods.heights`.
+        heights, else a prior, see `ftproc.methods.height`.
     """
 
     method: str = "ga-bpnn-ukf"

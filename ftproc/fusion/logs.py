@@ -20,7 +20,7 @@ from ftproc.fusion import positions
 from ftproc.fusion.estimation import beside
 from ftproc.fusion.estimation.events import Seen
 from ftproc.fusion.range_file import POSITION, Instrument, Range
-from ftproc.methods import heights
+from ftproc.methods.height.priors import prior_of
 from ftproc.quality import sanity
 from ftproc.records import ACCEPTED, REJECTED, FloatArray, MeasurementLog
 
@@ -79,7 +79,7 @@ def as_seen(
                 sides, instrument.times, instrument.away_m, copied, elevated=beside.elevated(log),
             )
         )  # fmt: skip
-    priors = [heights.prior_of(log, each.recipe.settings) for each, log in zip(instruments, found, strict=True)]
+    priors = [prior_of(log, each.recipe.settings) for each, log in zip(instruments, found, strict=True)]
     return beside.with_prior(seen, priors, origin), zero
 
 

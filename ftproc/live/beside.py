@@ -15,7 +15,8 @@ from ftproc.files.options import parse_columns, parse_units
 from ftproc.files.reading import further
 from ftproc.files.reading.further import Further
 from ftproc.files.words import QUANTITIES
-from ftproc.methods import heights
+from ftproc.methods.height import heights
+from ftproc.methods.height.priors import ANY, SPECIFIED, Prior
 from ftproc.records import FloatArray
 
 RANGE, ELEVATION = QUANTITIES.index("range"), QUANTITIES.index("elevation")
@@ -29,7 +30,7 @@ class Columns(NamedTuple):
     rate: Further | None = None
     height: Further | None = None
     own_m: float = 0.0
-    prior: heights.Prior | None = None
+    prior: Prior | None = None
     unused: str = ""
 
     @classmethod
@@ -42,7 +43,7 @@ class Columns(NamedTuple):
         specified = recipe.settings.height
         unused = height.name if height is not None and "elevation" in found else ""
         height = height if plane and specified is None else None
-        prior = heights.Prior(*specified, heights.SPECIFIED) if specified else heights.ANY
+        prior = Prior(*specified, SPECIFIED) if specified else ANY
         return cls(rate, height, site[2] if site else 0.0, prior if plane and height is None else None, unused)
 
     @property

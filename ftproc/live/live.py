@@ -25,9 +25,11 @@ from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Order
 from ftproc.long_records import joined
-from ftproc.methods import alone, heights, live, registry
+from ftproc.methods import live, registry
 from ftproc.methods import scalars as rates_of
 from ftproc.methods.estimate import Estimate
+from ftproc.methods.height import alone, heights
+from ftproc.methods.height.priors import Prior
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
 from ftproc.records import MISSING, FloatArray, IntArray, Trajectory
@@ -59,11 +61,11 @@ class Live:
         range_rates: bool = False,
         barometric: bool | None = None,
         model: Model | str | None = PACKAGED,
-        prior: heights.Prior | None = None,
+        prior: Prior | None = None,
     ) -> None:
         """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
         None for the lag. range_rates: whether the rows have columns of range rates. barometric: whether the heights
-        are that stand for the elevations (by `ftproc.methods.heights.elevation`); None where these are measured. model:
+        are that stand for the elevations (by `heights.elevation`); None where these are measured. model:
         the network's correction, as in `ftproc.filter_log`; rows with range, azimuth and elevation alone have one, with
         `live` and lag 0. prior: of the height, where no elevation or height is measured. Raises UsageError,
         ModelError."""
@@ -250,7 +252,7 @@ def _trajectory(
     correction: FloatArray,
     rates: bool = False,
     barometric: bool | None = None,
-    prior: heights.Prior | None = None,
+    prior: Prior | None = None,
 ) -> Trajectory:
     """The rows of an estimate with their correction (n, 6); none without one. rates, barometric, prior: as in
     `Live`."""

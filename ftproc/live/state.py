@@ -43,7 +43,7 @@ from ftproc.errors import InputError, OutputError
 from ftproc.files.writing import atomic
 from ftproc.live import live, order, times
 from ftproc.live.lines import forms, growing, plots
-from ftproc.methods import heights
+from ftproc.methods.height.priors import Prior
 
 MAGIC = b"ftproc state 1\n"
 _HEAD = struct.Struct("<Q16s")  # size and digest of what is known
@@ -59,7 +59,7 @@ _KINDS: dict[str, Any] = {
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, pieces.Flown, readings.Labels,
         readings.Repeats, rows.Waiting, rows.Published, records.Model, records.Start, smoother.SmootherRun,
         two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion, motion.Jolts, beside.Rates,
-        heights.Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,
+        Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,
         records.FilterRun,
     )
 }  # fmt: skip

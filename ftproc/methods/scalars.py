@@ -23,7 +23,7 @@ from ftproc.core.filtering.records import Model, Observations, Scalars, Start
 from ftproc.core.filtering.smoother import likelihood_of, residuals_beside, smooth_log
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, with_allowance
 from ftproc.core.model.earth import MEAN_RADIUS_M as EARTH_M
-from ftproc.methods import alone
+from ftproc.methods.height import alone
 from ftproc.order_statistics import median
 from ftproc.records import FlagArray, FloatArray, Heights
 

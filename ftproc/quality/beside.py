@@ -7,7 +7,7 @@ import numpy as np
 from ftproc.core import impact
 from ftproc.core.beside import Channel
 from ftproc.core.model.earth import MEAN_RADIUS_M
-from ftproc.methods.heights import Common
+from ftproc.methods.height.heights import Common
 from ftproc.records import BESIDE, Beside, Diagnostics, FlagArray, FloatArray, MeasurementLog
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ftproc.core.filtering.records import Start
     from ftproc.methods.estimate import Estimate
-    from ftproc.methods.heights import Common
+    from ftproc.methods.height.heights import Common
 
 UNITS = ("m", "rad", "rad")
 NO_HEIGHTS = "the heights beside the elevations are not used: only the main method's two-pass editing uses them"

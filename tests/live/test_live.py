@@ -12,7 +12,7 @@ import pytest
 
 import ftproc
 from ftproc.errors import InputError, UsageError
-from ftproc.methods import heights
+from ftproc.methods.height import heights
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 

@@ -22,7 +22,8 @@ from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.records import Scalars
 from ftproc.core.model.earth import ECCENTRICITY2, MEAN_RADIUS_M, RADIUS_M, Geodetic
 from ftproc.fusion.estimation.events import OFFSET, Events, Seen, Side
-from ftproc.methods import alone, heights
+from ftproc.methods.height import alone, heights
+from ftproc.methods.height.priors import SPECIFIED, Prior
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 
@@ -82,7 +83,7 @@ def elevated(log: MeasurementLog) -> bool:
     return log.heights is not None and bool(np.isfinite(log.measurement[:, 2]).any())
 
 
-def with_prior(stations: list[Seen], priors: Sequence[heights.Prior], origin: Geodetic | None) -> list[Seen]:
+def with_prior(stations: list[Seen], priors: Sequence[Prior], origin: Geodetic | None) -> list[Seen]:
     """The stations with what is known of the height beforehand, where none of them tells it: those with ranges and
     azimuths."""
     plane = [{0, 1} <= set(station.components) for station in stations]
@@ -97,7 +98,7 @@ def with_prior(stations: list[Seen], priors: Sequence[heights.Prior], origin: Ge
             value, ones = np.full(len(station.time_s), above), np.ones(len(station.time_s))
             side = Side(ASSUMED, layout.DISTANCE, value, prior.sigma_m, ones, centre, True, level)
             words = f"{prior.height_m:g} m above {station.name}, 1 sigma {prior.sigma_m:g} m"
-            if prior.why != heights.SPECIFIED:
+            if prior.why != SPECIFIED:
                 words = f"that of {prior.why}, {words} (height.prior_m of its station states another)"
             biases = station.prior.copy()
             biases[OFFSET] = prior.sigma_m

@@ -28,33 +28,18 @@ from ftproc.core.filtering.records import Uneven
 from ftproc.core.model import kinematics
 from ftproc.core.model.earth import MEAN_RADIUS_M as EARTH_M
 from ftproc.errors import InputError
-from ftproc.methods import alone, anti_outlier, preparing
-from ftproc.methods.alone import PRESSURE_M, TEMPERATURE
+from ftproc.methods import anti_outlier, preparing
 from ftproc.methods.estimate import Recording
+from ftproc.methods.height import alone
+from ftproc.methods.height.alone import PRESSURE_M, TEMPERATURE
+from ftproc.methods.height.priors import CHANGES_S, Prior, prior_of
 from ftproc.order_statistics import median
 from ftproc.records import ACCEPTED, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray, MeasurementLog
 from ftproc.settings import FilterSettings
 
 ABSENT = (2,)  # components that are missing where a height stands in
-SLOW_MPS = 30.0  # a target that is never faster is taken for a ship or a vehicle
-CHANGES_S = 300.0  # correlation time of an unknown height, for the sigmas of its rates
 STEEPEST = 0.9  # sine of the elevation: nearer to the vertical the azimuth says nothing of x and y
 MOST_OUTSIDE = 0.1  # share of heights that may be larger than the range
-FEWEST, BLOCKS, MOST_OF_BLOCKS = 3, 64, 0.9  # readings in a block, and blocks, for the speed; and of these speeds
-
-
-class Prior(NamedTuple):
-    """What is known of the height of all targets: m above the station, and 1-sigma. why: in words."""
-
-    height_m: float
-    sigma_m: float
-    why: str
-
-
-SPECIFIED = "specified"
-SLOW = Prior(0.0, 100.0, "a target that is never faster than 30 m/s")
-FAST = Prior(6000.0, 3500.0, "an aircraft")
-ANY = Prior(0.0, 6000.0, "any target")
 
 
 class Common(NamedTuple):
@@ -193,28 +178,6 @@ def _cleaned_ranges(recording: Recording, settings: FilterSettings) -> FloatArra
     return found
 
 
-def prior_of(log: MeasurementLog, settings: FilterSettings, causal: bool = False) -> Prior:
-    """What is known of the height where a log tells nothing of it. causal: whether its later rows are not known yet."""
-    if settings.height is not None:
-        return Prior(*settings.height, SPECIFIED)
-    if causal:
-        return ANY
-    return SLOW if _fastest(log.time_s, log.measurement) < SLOW_MPS else FAST
-
-
-def _fastest(time_s: FloatArray, measurement: FloatArray) -> float:
-    """m/s over the ground in nearly all of the log, by the medians of blocks of readings; infinite of too few."""
-    there = np.flatnonzero(np.isfinite(measurement[:, :2]).all(1))
-    if len(there) < FEWEST * FEWEST:
-        return math.inf
-    blocks = np.array_split(there, min(BLOCKS, len(there) // FEWEST))
-    x, y = measurement[:, 0] * np.cos(measurement[:, 1]), measurement[:, 0] * np.sin(measurement[:, 1])
-    t, east, north = (np.array([median(each[block]) for block in blocks]) for each in (time_s, x, y))
-    passed = np.diff(t) > 0
-    speed = np.hypot(np.diff(east), np.diff(north))[passed] / np.diff(t)[passed]
-    return float(np.quantile(speed, MOST_OF_BLOCKS)) if len(speed) else math.inf
-
-
 def placed(
     common: Common, part: slice, state: FloatArray, sigma: FloatArray, path_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -273,11 +236,12 @@ def _moved(prior: Prior, state: FloatArray, sigma: FloatArray) -> tuple[FloatArr
     found[:, 2] = z
     found[:, 3:5] = along * speed[:, None] + across * (ground * spin)[:, None]
     found[:, 6:8] = along * (growth - ground * spin**2)[:, None] + across * (ground * spun + 2 * speed * spin)[:, None]
-    wide[:, [2, 5, 8]] = prior.sigma_m / CHANGES_S ** np.arange(3)
+    wide[:, [2, 5, 8]] = prior.sigma_m / prior.changes_s ** np.arange(3)
+    rate_mps = prior.sigma_m / prior.changes_s
     ends = np.sqrt([np.maximum(slant**2 - (z + sign * 2 * prior.sigma_m) ** 2, 0.0) for sign in (-1, 1)])
     open_m = np.abs(ends - ground).max(0) / 2
     _add(wide, 0, along, open_m)
-    _add(wide, 3, along, np.hypot(np.abs(speed) * open_m, np.abs(z) * prior.sigma_m / CHANGES_S) / ground)
+    _add(wide, 3, along, np.hypot(np.abs(speed) * open_m, np.hypot(z, prior.sigma_m) * rate_mps) / ground)
     found[np.isnan(state[:, :3]).any(1)] = wide[np.isnan(state[:, :3]).any(1)] = np.nan
     return found, wide
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ftproc.methods import alone
+from ftproc.methods.height import alone
 
 STEP = 7.62  # 25 ft
 
