@@ -286,17 +286,6 @@ def _trajectory(
     if absent:
         label[:, absent] = MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
-    return Trajectory(
-        "live",
-        row,
-        time_s,
-        cleaned,
-        state,
-        sigma,
-        cleaned_sigma,
-        label,
-        run.nis,
-        correction,
-        extra=arrow.table(columns) if columns else None,
-        path_sigma=path_sigma,
-    )
+    given = row, time_s, cleaned, state, sigma, cleaned_sigma, label, run.nis, correction
+    extra = arrow.table(columns) if columns else None
+    return Trajectory("live", *given, extra=extra, path_sigma=path_sigma)
