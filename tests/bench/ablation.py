@@ -149,7 +149,8 @@ RULES: dict[str, tuple[Off, ...]] = {
     "reassessment": (Off(TWO_PASS, "reassess", _second),),
     "turns taken for patches": (Off(TWO_PASS, "screen", _same_screen),),
     "curves through long gaps": (Off("ftproc.methods.bridging", "bridged", bridging.none),),
-    "less noise": (Off(TWO_PASS, "with_less_noise", _first),),
+    "far less noise": (Off(TWO_PASS, "with_less_noise", _first),),
+    "less noise of slow readings": (Off(TWO_PASS, "finer_noise", _empty),),
     "allowance on the jerk": (Off(TWO_PASS, "with_allowance", _second),),
 }
 

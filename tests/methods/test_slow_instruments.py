@@ -13,6 +13,7 @@ from ftproc.core.filtering.smoother import likelihood_of
 from ftproc.core.identification import likelihood
 from ftproc.core.model.motion import isotropic
 from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate
 from tests.drone import CRUISER, FAR, apart, holding, read, seen
 
 
@@ -36,6 +37,19 @@ def test_motion_is_not_taken_for_noise():
     """At 5 Hz the smoother is about as good as the readings; it was three times worse, with 15 times their noise."""
     error = [outcome(seed, 0.2, (0.002, 1e-5, 1e-5))[0] for seed in range(5)]
     assert np.median(error) < 0.006
+
+
+@pytest.mark.parametrize(
+    ("scenario", "dt_s", "seed", "most_m"), [("cruise", 5.0, 10, 4.0), ("aerodynamic", 1.0, 12, 4.0)]
+)
+def test_less_noise_may_be_likelier(scenario, dt_s, seed, most_m):
+    """Aircraft each five seconds, or one: 10.7 and 10.5 m, with two and three times the noise."""
+    flight = simulate(scenario, seed=seed, dt_s=dt_s)
+    found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+    kept = np.isin(flight.truth.time_s, found.time_s)
+    off = found.state[:, :3] - flight.truth.position_m[kept]
+    assert np.sqrt((off**2).sum(1).mean()) < most_m
+    assert (np.abs(off) < 3 * found.sigma[:, :3]).mean() > 0.98
 
 
 def test_most_noise_is_within_the_doubt():

@@ -43,6 +43,9 @@ LONGEST_SPAN = 3000  # samples that are decided together
 AT_LEAST = 1.02  # times the least noise that is allowed: less of it is at its bound
 MANY, FAR_LESS = 2, 0.25  # components of which that is so, and the share of their noise that must be enough: where less
 # comes of it, it is readings of a patch that were rejected
+LESS, LESS_LIKELIER = 3.0, 3.0  # times less noise of a component, or more; and by how much likelier that must be, in
+# log-probability
+SHORT_MEMORY, LONG_MEMORY = 8.0, 0.5  # samples, and share of the log: between them less noise was never likelier
 FINER, FINEST = 16.0, 3  # times less noise, and how often
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
 
@@ -181,6 +184,28 @@ def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Recor
             break
         found = other
     return found
+
+
+def finer_noise(found: tuple[Record, Decision], begin: Begin) -> Iterator[tuple[Record, Decision]]:
+    """The decisions made again from less and less noise, while that is likelier, where the readings hardly tell noise
+    from motion: the noise is the least that screening allows, or the filter remembers few of them, or most."""
+    for _ in range(FINEST):
+        record, decision = found
+        if record.fixed.noise.all() or not _may_be_motion(record, decision):
+            return
+        other = begin(record._replace(sigma=record.sigma / LESS), record.screened)
+        if preferred(found, other) is found or log_probability(*other) < log_probability(*found) + LESS_LIKELIER:
+            return
+        yield other
+        found = other
+
+
+def _may_be_motion(record: Record, decision: Decision) -> bool:
+    """Whether some of the noise may be motion, or of the motion noise."""
+    model = decision.model
+    at_least = model.noise_variance <= AT_LEAST * (record.sigma / NOISE_SHRINKS) ** 2
+    memory = scales_of(record.weighted(decision.weight), model.noise_variance).memory_samples(float(model.jerk[0, 0]))
+    return bool((at_least & ~record.fixed.noise).any()) or not SHORT_MEMORY < memory < LONG_MEMORY * len(record.time_s)
 
 
 def log_probability(record: Record, decision: Decision) -> float:

@@ -31,7 +31,14 @@ from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import MOTION, STEP, Faults, Shift, others, refined
 from ftproc.core.editing.lasting.rejected_runs import OPEN, reassess_rejected
 from ftproc.core.editing.lasting.settling import Understood, without_lasting
-from ftproc.core.editing.reassessment import likelier, log_probability, preferred, reassess, with_less_noise
+from ftproc.core.editing.reassessment import (
+    finer_noise,
+    likelier,
+    log_probability,
+    preferred,
+    reassess,
+    with_less_noise,
+)
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
@@ -53,6 +60,7 @@ COARSE = 0.5  # of a component's noise: rounding that makes so much of it decide
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
+MOST_REJECTED = 0.2  # of a component: where more is, it is not yet told what the noise is
 REJECTED, GROWN = 0.05, 100.0  # of a component: where more is, noise may have grown; the gain in log-probability with
 # which it has: up to 75 at take-offs and patches, from 577 where noise is tenfold for a third of a log
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
@@ -187,6 +195,11 @@ def _decided(
         first = likelier(first, begin(record, record.screened, shortest=REMEMBERED))
     record, decision = with_less_noise(first, begin)
     found = _examined(record, decision, known)
+    for finer in finer_noise((record, decision), begin) if not _rejects_many(*found, MOST_REJECTED) else ():
+        other = _examined(*finer, known)
+        if preferred(found, other) is found:
+            break
+        found = other
     if jerk_psd is None and found[1].stamp_s == 0 and not found[1].settled:  # turns may have been taken for patches
         other = begin(record, jumps_only * possible)
         takes_in = (other[1].weight > found[1].weight).any()
@@ -241,7 +254,7 @@ def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record,
         found = allow_for_tails(*_with_late_stamps(record, decision))
     for _ in range(0 if record.white else DRIFT_ROUNDS):
         before, found = found, likelier(found, allow_for_drift(*found))
-        if _rejects_many(*before):
+        if _rejects_many(*before, REJECTED):
             grown = allow_for_drift(*before, rejected=True)
             if log_probability(*grown) > log_probability(*found) + (0.0 if found[1].drifts else GROWN):
                 found = grown
@@ -250,10 +263,10 @@ def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record,
     return found if known.jerk_psd is not None else (found[0], reassess(*found))
 
 
-def _rejects_many(record: Record, decision: Decision) -> bool:
-    """Whether so much is rejected of some component that its noise may be larger for a while."""
+def _rejects_many(record: Record, decision: Decision, share: float) -> bool:
+    """Whether such a share is rejected of some component: its noise may be larger for a while."""
     rejected = (record.possible & (decision.weight <= 0)).sum(0)
-    return bool((rejected > REJECTED * record.possible.sum(0)).any())
+    return bool((rejected > share * record.possible.sum(0)).any())
 
 
 def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
