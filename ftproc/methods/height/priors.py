@@ -41,9 +41,9 @@ def prior_of(log: MeasurementLog, settings: FilterSettings, causal: bool = False
     if causal:
         return ANY
     fastest_mps, range_m = _fastest(log.time_s, log.measurement), log.measurement[:, 0]
-    if fastest_mps < SLOW_MPS:
-        return SLOW
     typical_m = median(range_m[np.isfinite(range_m)]) if np.isfinite(range_m).any() else math.inf
+    if fastest_mps < SLOW_MPS:
+        return SLOW._replace(sigma_m=min(SLOW.sigma_m, _even(typical_m)))
     return _at(typical_m)._replace(changes_s=min(typical_m / fastest_mps, CHANGES_S))
 
 
@@ -51,8 +51,12 @@ def _at(range_m: float) -> Prior:
     """That of an aircraft; where its range is shorter, of any height that is no larger."""
     if range_m > FAST.height_m + FAST.sigma_m:
         return FAST
-    height_m, sigma_m = (float(f"{of * range_m:.2g}") for of in (1 / 2, 1 / math.sqrt(12)))
-    return Prior(height_m, sigma_m, "an aircraft as near as this one")
+    return Prior(float(f"{range_m / 2:.2g}"), _even(range_m), "an aircraft as near as this one")
+
+
+def _even(range_m: float) -> float:
+    """1-sigma of an even chance of all heights up to a range, in two digits."""
+    return float(f"{range_m / math.sqrt(12):.2g}")
 
 
 def _fastest(time_s: FloatArray, measurement: FloatArray) -> float:

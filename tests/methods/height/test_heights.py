@@ -134,6 +134,16 @@ def test_what_is_near_is_no_higher_than_it_is_far(seed):
     assert ((np.abs(off[:, 3:6]) < 3 * found.sigma[:, 3:6]).mean(0) > 0.85).all()
 
 
+@pytest.mark.parametrize(("range_m", "sigma_m"), [(20.0, 5.8), (5e3, 100.0)])
+def test_a_slow_target_is_no_higher_than_it_is_far_either(range_m, sigma_m):
+    """A robot at 20 m had velocities with 1-sigmas of up to 4.5 m/s, for errors of 0.3."""
+    time_s = np.arange(0.0, 60.0, 0.5)
+    none = np.full(len(time_s), np.nan)
+    reading = np.column_stack([np.full(len(time_s), range_m), 0.1 + 1e-4 * np.sin(time_s), none])
+    prior = priors.prior_of(MeasurementLog("slow", time_s, reading, np.arange(len(time_s))), FilterSettings())
+    assert (prior.height_m, prior.sigma_m) == (0.0, sigma_m)
+
+
 def test_heights_in_the_wrong_unit_are_refused():
     flight = simulate("surveillance-2d", seed=1)
     wrong = Heights(flight.log.heights.above_m * 100, True)
