@@ -83,12 +83,15 @@ def read(values: FloatArray, column: Column, source: str = "") -> Clock:
     if kind in ("", "unix", "day") and 1e6 <= size < _CALENDAR[0] and is_hhmmss(of_day) and _jumps(of_day):
         seconds, notes = unrolled(from_hhmmss(of_day), DAY_S)
         return Clock(seconds, "", "time of day as hhmmss behind a date, in s since midnight", notes)
+    if kind in ("", "unix", "day") and 1e6 <= size < _CALENDAR[0] and _is_before_a_date(known):
+        seconds, notes = unrolled(from_hhmmss(np.floor(values / 1e6)), DAY_S)
+        return Clock(seconds, "", "time of day as hhmmss before a date, in s since midnight", notes)
     for power, name in ((1e9, "ns"), (1e6, "us"), (1e3, "ms")):
         if kind != "week" and column.name != CANONICAL["time"] and _UNIX_FROM <= size / power < _UNIX_TO:
             return Clock(values / power, UNIX_EPOCH, f"{name} since 1970 UTC, by the size of the numbers")
     if kind in ("", "unix", "day") and _is_calendar(known):
         return _of_calendar(values)
-    if _is_hhmmss(kind, column.notation, values, most):
+    if _is_hhmmss(kind, column.notation, values, most) or (kind in ("day", "") and _has_digits_behind(values)):
         seconds, notes = unrolled(from_hhmmss(values / (digits_behind(values, column) or 1.0)), DAY_S)
         return Clock(seconds, "", "time of day as hhmmss, in s since midnight", notes)
     period = {"day": DAY_S, "week": WEEK_S, "gps": WEEK_S}.get(kind)
@@ -169,6 +172,29 @@ def _is_hhmmss(kind: str, notation: str, values: FloatArray, most: float) -> boo
     if notation.startswith("hhmmss") or kind == "digits":
         return True
     return kind in ("day", "") and DAY_S < most < 240_000 and is_hhmmss(values) and (kind == "day" or _jumps(values))
+
+
+def _is_before_a_date(known: FloatArray) -> bool:
+    """Whether the numbers are hhmmss before six digits of a date, which steps at midnight alone: hhmmssddmmyy."""
+    of_day, dates = np.floor(known / 1e6), known % 1e6
+    steps = np.flatnonzero(np.diff(dates))
+    at_midnight = bool((np.diff(of_day)[steps] < 0).all())
+    return at_midnight and is_hhmmss(of_day) and _jumps(of_day) and _is_short_date(np.unique(dates))
+
+
+def _is_short_date(dates: FloatArray) -> bool:
+    """Whether six digits are ddmmyy, yymmdd or mmddyy."""
+    first, middle, last = dates // 1e4, dates // 100 % 100, dates % 100
+    pairs = ((first, middle), (last, middle), (middle, first))
+    return any(bool(((day >= 1) & (day <= 31) & (month >= 1) & (month <= 12)).all()) for day, month in pairs)
+
+
+def _has_digits_behind(values: FloatArray) -> bool:
+    """Whether the numbers are hhmmss with digits of the second behind it, and jump at each full minute: 1031050."""
+    most = float(np.nanmax(values))
+    return any(
+        DAY_S * by < most < 240_000 * by and is_hhmmss(values / by) and _jumps(values / by) for by in _BEHIND[:3]
+    )
 
 
 def _is_hhmmss_named_s(values: FloatArray, column: Column) -> bool:

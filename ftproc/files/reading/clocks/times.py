@@ -30,6 +30,7 @@ _COUNTED = (  # whole cells: from the start of a flight, and with a unit
     r"^[TL]\s?(?P<number>[+-]\d+\.?\d*)\s*(?P<unit>[A-Za-z]*)$",
     r"^(?P<number>[+-]?\d+\.?\d*)\s*(?P<unit>[A-Za-z]+)$",
 )
+_TO_AN_EVENT = r"^(?:[TL]\s?)?(?P<sign>[+-]?)\s?(?P<hour>\d{1,3}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d*)?)$"
 _MOST_OF_A_YEAR = 360  # days
 
 
@@ -54,7 +55,7 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
     if without_text(column) is None:
         text = as_text(column)
         if parsed(text, origin.decimal_comma) is None:
-            counted_up = _with_unit(text)
+            counted_up = _with_unit(text) or _counted_down(text)
             counted_up = counted_up or timecode.read(text, origin, described)
             return _on_gps(stamped(text, origin), described) if counted_up is None else counted_up
         column = text
@@ -89,6 +90,24 @@ def _with_unit(text: pa.ChunkedArray) -> Clock | None:
         return None
     values = arrow.to_numpy(pc.struct_field(fields, "number").cast(pa.float64()))
     return Clock(unit.to_si(values), "", f"numbers in {unit.name}, as every cell says")
+
+
+def _counted_down(text: pa.ChunkedArray) -> Clock | None:
+    """The clock of cells such as `T-00:00:05.0` before an event and `T+00:00:01.0` after it; None of others."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    fields = pc.extract_regex(text, pattern=_TO_AN_EVENT)
+    signs = pc.struct_field(fields, "sign")
+    if fields.null_count > text.null_count or not pc.any(pc.equal(signs, "-")).as_py():
+        return None
+
+    def part(name: str) -> FloatArray:
+        cells = pc.replace_substring(pc.struct_field(fields, name), ",", ".")
+        return arrow.to_numpy(cells.cast(pa.float64()))
+
+    size = 3600 * part("hour") + 60 * part("minute") + part("second")
+    return Clock(np.where(np.array(signs.to_pylist()) == "-", -size, size), "", "durations before and after an event")
 
 
 def seconds(

@@ -224,6 +224,8 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
     text = encoding.as_utf8(source, data, cut and len(data) >= _HEAD)
     if not (cut or text.was):
         text = text._replace(data=trimming.unboxed(text.data))
+    whole, behind = (text.data, "") if cut else trimming.without_comments_behind(text.data)
+    text = text._replace(data=whole)
     if not text.data.strip():
         raise InputError(f"{source}: the file is empty; expected a header line and rows.")
     if (plain := None if widths else _plain(text.data)) is not None:
@@ -235,7 +237,7 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
     body = memoryview(text.data)[start:]
     if not cut:
         body, dropped = trimming.rows_only(source, body, found.names, found.delimiter, widths)
-        found = found._replace(form=found.form + dropped)
+        found = found._replace(form=found.form + behind + dropped)
     odd = text.data.count(b'"', start) % 2 == 1
     separated = f"text, separated by {_SEPARATOR_NAMES[found.delimiter]}" if not widths else "text in fixed widths"
     form = ", ".join(part for part in (text.was and f"{text.was}", separated, found.form) if part)

@@ -6,13 +6,13 @@ the line of names stands directly above these lines.
 
 from __future__ import annotations
 
-import bisect
 import csv
 import itertools
 import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from ftproc.files.reading.formats import headings
 from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.preamble import are_units, enumerated, units_stated
@@ -43,6 +43,8 @@ _UNNAMED = {
     "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
     "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
 }
+#: What may stand behind the last name and in no row: a separator, or a name of comments, as LabVIEW writes them.
+_LAST_OF_NAMES = ("", "comment", "comments", "remark", "remarks", "note", "notes")
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
 _CALLED = re.compile(
     r"^\s*(?:columns?|fields?|names?|header)\s*[:=]\s*", re.IGNORECASE
@@ -168,7 +170,11 @@ def _with_names(
         if cells is not None and are_units(cells) and index:
             units, index = cells, index - 1
     names = None if index < 0 else _heading(lines[filled[index]], separator, width, block, widths)
-    groups = _groups(lines[filled[index]], names or [], separator, block, width) if units and not widths else []
+    groups = (
+        headings.groups(lines[filled[index]], names or [], separator == BLANKS, block, width)
+        if units and not widths
+        else []
+    )
     names, units = parts.under(groups, units) or (names, units)
     if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
@@ -177,12 +183,12 @@ def _with_names(
         return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
     if names is None and index >= 0 and top - index == 1 and (cells := _mismatched(lines[filled[index]], separator)):
         names = cells  # the rows have too many or too few cells, and are refused
-    over = [lines[number] for number in filled[max(index - 1, 0) : index + 1]]
+    over = [lines[number] for number in filled[max(index - 2, 0) : index + 1]]
     if names is None and separator == BLANKS:
-        names = _stacked(over, block, width)
-    elif names is not None and not all(names) and len(over) > 1:  # groups of columns, such as merged cells
-        groups = split(over[0], separator, widths)
-        names = [name or group for name, group in zip(names, groups, strict=True)] if len(groups) == width else names
+        names = headings.stacked(over, block, width)
+    elif names is not None and len(over) > 1:
+        groups = split(over[-2], separator, widths) if separator != BLANKS else []
+        names = headings.under_groups(names, groups) if len(groups) == len(names) else names
     numbers = [str(k + 1) for k in range(width)]
     found = numbers if names is None else names
     if len(units) != len(found):
@@ -224,16 +230,20 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
         bare = _CALLED.sub("", bare)
     ways = [split(bare, separator, widths)]
     if separator == BLANKS:
-        ways += [re.split(r"\s{2,}|\t", bare.strip()), _joined_brackets(bare), _aligned(bare, block, width)]
+        ways += [
+            re.split(r"\s{2,}|\t", bare.strip()),
+            headings.joined_brackets(bare),
+            headings.aligned(bare, block, width),
+        ]
         ways += [[cell.strip() for cell in bare.split(mark)] for mark in (",", ";", "|") if mark in bare]
         first = next((name for name, pattern in _UNNAMED.items() if _begin_with(block, pattern)), "")
-        ways += [[first, *way] for way in (bare.split(), _joined_brackets(bare)) if first]
+        ways += [[first, *way] for way in (bare.split(), headings.joined_brackets(bare)) if first]
     elif separator == "\t":
-        ways += [bare.split(), _joined_brackets(bare)]
+        ways += [bare.split(), headings.joined_brackets(bare)]
     for cells in ways:
         if len(cells) == width:
             return cells
-        if len(cells) == width + 1 and not cells[-1]:  # a separator at the end of the names, but not of the rows
+        if len(cells) == width + 1 and cells[-1].lower() in _LAST_OF_NAMES:
             return cells[:-1]
         if len(cells) == width - 1 and separator != BLANKS and all(row.rstrip().endswith(separator) for row in block):
             return [*cells, ""]
@@ -246,55 +256,3 @@ def _begin_with(block: Sequence[str], pattern: str) -> bool:
     numbers = [int(match[1]) for match in found if match.groups()]
     steps = (later - before for before, later in itertools.pairwise(numbers))
     return len(found) == len(block) and all(step == 1 for step in steps)
-
-
-def _joined_brackets(line: str) -> list[str]:
-    """The words of a line, each with the bracket that follows it."""
-    cells = re.findall(r"[^\s(\[]+(?:\s*[(\[][^)\]]{0,200}[)\]])?", line)
-    return [str(cell) for cell in cells]
-
-
-def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
-    """The words of a line by the column of numbers that each stands above."""
-    found = _above_columns(line, block, width)
-    return found if found and all(found) else []
-
-
-def _stacked(over: Sequence[str], block: Sequence[str], width: int) -> list[str] | None:
-    """The names of columns that stand in two lines, one word above the other; None unless several are known."""
-    parts = [_above_columns(line, block, width) for line in over]
-    if len(parts) < 2 or not all(parts):
-        return None
-    names = [" ".join(filter(None, words)) for words in zip(*parts, strict=True)]
-    known = [name for name in map(taken_apart, names) if any(name.means(quantity) for quantity in QUANTITIES)]
-    return names if all(names) and len(known) > 1 else None
-
-
-def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
-    """The words above each column of numbers, "" where there are none; nothing if the rows do not line up."""
-    middles = _middles(block, width)
-    if not middles:
-        return []
-    cells: list[list[str]] = [[] for _ in range(width)]
-    for word in re.finditer(r"\S+", line):
-        behind = bisect.bisect(middles, centre := (word.start() + word.end()) / 2)
-        beside = range(max(behind - 1, 0), min(behind + 1, width))
-        cells[min(beside, key=lambda k: abs(middles[k] - centre))].append(word[0])
-    return [" ".join(words) for words in cells]
-
-
-def _groups(line: str, cells: Sequence[str], separator: str, block: Sequence[str], width: int) -> list[str]:
-    """What stands over each column in the line of names: an empty cell belongs to the name before it, and words two
-    blanks apart from others to all the columns that they are nearest to; nothing if the rows do not line up."""
-    if separator != BLANKS:
-        return [next(filter(None, cells[k::-1]), "") for k in range(len(cells))]
-    over = [(found.start() + found.end(), found[0]) for found in re.finditer(r"\S+(?: \S+)*", line)]
-    nearest = [min(over, key=lambda each: abs(each[0] - 2 * middle)) for middle in _middles(block, width) if over]
-    return [words for _, words in nearest] if {*nearest} == {*over} else []
-
-
-def _middles(block: Sequence[str], width: int) -> list[float]:
-    """The middle of each column of numbers, in characters; nothing if the rows do not line up."""
-    spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
-    spans = [row for row in spans if len(row) == width]
-    return [sum(low + high for low, high in column) / (2 * len(spans)) for column in zip(*spans, strict=True)]

@@ -16,6 +16,11 @@ from ftproc.files.reading.formats import layout
 _MARKS, MOST_MARKS = (b",", b";", b"\t", b"|"), limits.MOST_COLUMNS + 2
 _FOOTER = 30  # lines at the end of a file, at most
 _COMMENT = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!)[^\r\n]*(?:\r\n|\r|\n|\Z)")
+#: A comment behind a row, of which the last cell is a number.
+_BEHIND_A_NUMBER = re.compile(
+    rb"(?m)^([ \t]*[-+.]?\d(?:[^\r\n,;|\t]{0,400}?|[^\r\n]{0,400}?[,;|\t] *[-+]?[\d.][\d.eE+-]{0,30}?)(?<=\d))"
+    rb"[ \t]+(?:#|//|!)[ \t][^\r\n]*"
+)
 #: First cells of rows below the table that sum it up, in small letters.
 _SUMS = frozenset(
     [
@@ -51,6 +56,14 @@ def unboxed(data: bytes) -> bytes:
     return re.sub(rb"(?m)^[ \t]*\|(.*)\|[ \t]*(?=\r?$)", rb"\1", without_rules)
 
 
+def without_comments_behind(data: bytes) -> tuple[bytes, str]:
+    """A text without the comments that stand behind rows, `12.5, 1000 # lock lost`, and in words what was left out."""
+    if not any(mark in data for mark in (b"# ", b"// ", b"! ", b"#\t")):
+        return data, ""
+    plain, count = _BEHIND_A_NUMBER.subn(rb"\1", data)
+    return plain, f", {count} comments behind rows" if count else ""
+
+
 def rows_only(
     source: str, body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]
 ) -> tuple[memoryview, str]:
@@ -69,6 +82,9 @@ def rows_only(
     if sentences:
         whole = _without(whole, sentences)
         words += f", {len(sentences)} lines of words among the rows"
+    if zeros := len(whole) - len(whole.rstrip(b"\0")):  # of a file that was made longer beforehand
+        whole = whole[:-zeros]
+        words += f", {zeros} zeros behind the rows"
     end, footer = _end(whole, names, separator, widths)
     words += f", {footer} lines below the table" if footer else ""
     return memoryview(whole)[:end], words

@@ -43,7 +43,13 @@ _EASTERN, _LONGEST_UNIT = "\u2e80", 4  # letters from here on stand before a uni
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
 _OF_FRAMES = re.compile(r"(\d+(?:\.\d+)?)\s*(?:fps|frames?(?:\s*/\s*s| per second)?)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
+#: Names that are nothing but how a time is written: hh:mm:ss.sss, min:sec, hhmmssddmmyy.
+_CLOCK_FACE = re.compile(
+    r"(?:yy|yyyy|mm|dd|ddd|doy)*(?:hh?mm?s{1,2}|hhmms{2}[sfm]+|hours?min(?:utes)?sec(?:onds)?)(?:dd|mm|yy|yyyy)*"
+    r"|min(?:utes)?sec(?:onds)?|mmss[sf]*"
+)
 _TIMES = ("time", "timestamp", "stamp", "t")
+_SECONDS, _COUNTED_FROM = ("seconds", "secs", "sec"), frozenset(("of", "since", "after", "from"))
 _OF_UTC = ("utc", "gmt")  # behind the name of a time
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 
@@ -104,12 +110,18 @@ class Name(NamedTuple):
                 return rank
         core = self.core()
         known = core in (*ALIASES[quantity], *WEAK_ALIASES[quantity]) and core != self.stem
-        return 2 if known or (quantity == "time" and self._is_of_a_time()) else 0
+        return 2 if known or (quantity == "time" and (self._is_of_a_time() or self._is_a_clock_face())) else 0
 
     def _is_of_a_time(self) -> bool:
         """Whether it is a time with words that say whose it is, or from when it counts."""
         times = [word for word in self.words if word in _TIMES]
+        if not times and not _COUNTED_FROM.isdisjoint(self.words):  # seconds since launch
+            times = [word for word in self.words if word in _SECONDS]
         return len(times) == 1 < len(self.words) and OF_TIMES.issuperset({*self.words} - {*times})
+
+    def _is_a_clock_face(self) -> bool:
+        """Whether it is nothing but how a time is written."""
+        return _CLOCK_FACE.fullmatch(self.stem) is not None and (not self.stem.startswith("mmss") or ":" in self.text)
 
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
@@ -138,6 +150,8 @@ def taken_apart(text: str, unit: str = "") -> Name:
         return Name(text, "", ())
     plain = compatible(text).strip().strip("\"'#%;!:").strip()
     plain = EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
+    if _is_a_clock(plain):
+        return Name(text, _squeezed(plain), (_squeezed(plain),))
     found, notation, foreign = "", "", False
     opening = plain.rfind(_OPENING[_CLOSING.index(plain[-1])]) if plain.endswith(_CLOSING) else -1
     if opening >= 0:
@@ -148,7 +162,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
             plain, found = before, known
         elif frames := _OF_FRAMES.fullmatch(inside):
             plain, notation = before, f"{frames[1]}fps"
-        elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed:
+        elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed or _is_a_clock(inside):
             plain, notation = before, _ALSO.get(squeezed, squeezed)
         elif squeezed == "g" and not _OF_SURVEYORS.isdisjoint(_words(before)[1]):
             plain, found = before, "gon"
@@ -189,6 +203,13 @@ def _unit_inside(text: str) -> str:
     return next((part for part in re.split(r"[\s,;]+", text) if _is_unit(part)), "")
 
 
+def _is_a_clock(text: str) -> bool:
+    """Whether it is how a time is written: mm:ss.s, hhmmss.ss."""
+    face = _squeezed(text)
+    digits = face.startswith("hh") and re.fullmatch(r"[A-Za-z.]+", text) is not None
+    return (":" in text or digits) and _CLOCK_FACE.fullmatch(face) is not None
+
+
 def _squeezed(text: str) -> str:
     """A notation such as `hh:mm:ss.sss` as hhmmss."""
     return re.sub(r"s{2,}$", "ss", re.sub(r"[^a-z]", "", text.lower()))
@@ -214,6 +235,8 @@ def _suffix(text: str) -> tuple[str, str, bool]:
     if scaled and _is_unit(scaled[2]):
         return scaled[1], scaled[2], False
     found = _LAST.fullmatch(text)
+    if found and found[1].lower().endswith((" of", "_of")):  # seconds of day
+        return text, "", False
     if found and found[2].lower() in _FOREIGN and found[2].lower() not in ("raw", "v", "c", "k", "g", "w", "hz"):
         return found[1], "", True
     if found:

@@ -137,7 +137,7 @@ def without_thousands(
 
     Raises InputError where both marks stand for decimals elsewhere.
     """
-    written = [k for k, origin in enumerate(origins) if origin.decimal_comma and without_text(columns[k]) is None]
+    written = [k for k in range(len(origins)) if without_text(columns[k]) is None]
     texts = {k: as_text(columns[k]) for k in written}
     marks = {k: [mark for mark in ".," if _has(text, mark)] for k, text in texts.items()}
     one_mark = {k: mine[0] for k, mine in marks.items() if len(mine) == 1}
@@ -228,6 +228,14 @@ def as_text(column: pa.ChunkedArray) -> pa.ChunkedArray:
     if _has(trimmed, '"'):  # quoted between blanks
         trimmed = pc.replace_substring_regex(trimmed, '^"\\s*([^"]*?)\\s*"$', r"\1")
     return pc.if_else(pc.is_in(trimmed, pa.array(MISSING_WORDS, trimmed.type)), None, trimmed)
+
+
+def without_unit(text: pa.ChunkedArray) -> pa.ChunkedArray:
+    """The cells without the unit that stands behind the number in all of them: 45.2°."""
+    import pyarrow.compute as pc
+
+    behind = pc.unique(pc.replace_substring_regex(text, r"^.*[\d.]", "")).drop_null().to_pylist()
+    return _without(text, behind[0]) if len(behind) == 1 and behind[0] else text
 
 
 def _in_python(column: pa.ChunkedArray) -> list[object]:

@@ -16,7 +16,18 @@ _SECONDS_OF_WEEK = frozenset(
 )
 #: Part of a time -> stems of the names that it has.
 _TIME = {
-    "date": ("date", "utcdate", "dateutc", "datum", "gpsdate", "yyyymmdd", "calendardate", "ddmmyyyy"),
+    "date": (
+        "date",
+        "utcdate",
+        "dateutc",
+        "datum",
+        "gpsdate",
+        "yyyymmdd",
+        "calendardate",
+        "ddmmyyyy",
+        "ddmmyy",
+        "yymmdd",
+    ),
     "week": ("week", "gpsweek", "wk", "wn", "gpswk", "weeknumber", "gpsweekno", "weekno", "gpsweeknumber"),
     "doy": ("doy", "dayofyear", "yday", "jday", "ddd", "day", "daynumber", "julday", "dayno", "yearday", "irigday"),
     "year": ("year", "yr", "yyyy", "utcyear"),

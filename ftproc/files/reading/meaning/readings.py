@@ -3,7 +3,6 @@ in the cells, degrees, minutes and seconds in one column or three."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,6 +21,7 @@ from ftproc.files.reading.meaning.numbers import (
     without_text,
 )
 from ftproc.files.reading.meaning.schema import Column
+from ftproc.files.reading.meaning.values import angles
 from ftproc.files.units import UNITS, si_unit, unit_named
 from ftproc.files.words import DEPRESSIONS
 from ftproc.order_statistics import median, quantile
@@ -50,14 +50,7 @@ NUMBERS = (*(sign * value for value in (*_NINES, *_LIMITS) for sign in (1, -1)),
 
 _FEWEST = 10  # values among which one stands out
 _FAR = 20.0  # typical steps from the neighbours, for a number that stands out among others
-_DMS = (
-    r"^(?P<sign>[+-]?)(?P<deg>\d{1,3})\s*[°ºd:\- ]\s*(?P<min>\d{1,2}(?:[.,]\d+)?)\s*(?:['’′m:\- ]\s*"
-    r"(?:(?P<sec>\d{1,2}(?:[.,]\d*)?)\s*(?:\"|''|”|″|s)?)?)?$"
-)
 _WITH_UNIT = r"^(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°º]+)$"
-_PACKED = re.compile(r"d+m+s+f*")  # notations of degrees, minutes and seconds in the digits of one number
-_MINUTES = re.compile(r"d+m+")  # of degrees and minutes
-_MOST_TURN = 720.0  # deg
 _MOST_WORDS = 3  # that stand for missing numbers in one column
 
 
@@ -80,7 +73,7 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
         carried.refuse_others(origin.source, described, degrees, minutes)
         sign = np.where(np.signbit(degrees), -1.0, 1.0)
         rest = seconds[0] if seconds else np.zeros(len(minutes))
-        return Readings(_joined(sign, np.abs(degrees), minutes, rest), _in_degrees(described))
+        return Readings(angles.joined(sign, np.abs(degrees), minutes, rest), _in_degrees(described))
     (column,) = columns
     words: tuple[str, ...] = ()
     if without_text(column) is None:
@@ -91,7 +84,7 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
             if parsed(text, origin.decimal_comma) is None:
                 found = (
                     _hundreds(text, described)
-                    or _degrees(text, origin, described)
+                    or _in_words(text, origin, described)
                     or _with_units(text, origin, described)
                 )
                 if found is None:
@@ -106,22 +99,29 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
     if described.key in DEPRESSIONS:
         values = -values
         words += (f'"{described.name}" counts downwards and is turned round',)
-    if _PACKED.fullmatch(described.notation) and described.quantity != "range":
-        return Readings(_from_digits(values), _in_degrees(described), words)
-    if _MINUTES.fullmatch(described.notation) and described.quantity != "range":  # 302.4705: 302 degrees, 47.05 minutes
-        whole = np.trunc(np.round(values, 9))
-        return Readings(whole + (values - whole) * 100 / 60, _in_degrees(described), words)
+    unpacked = angles.unpacked(values, described.notation, described.name, described.quantity)
+    if unpacked is not None:
+        return Readings(unpacked, _in_degrees(described), words)
     return Readings(values, described, words)
 
 
-def _turned(angles: Sequence[FloatArray], described: Column) -> Readings:
+def _in_words(text: pa.ChunkedArray, origin: Origin, described: Column) -> Readings | None:
+    """The angles of a column of degrees, minutes and perhaps seconds, or of quadrants; None if it is none."""
+    if described.quantity == "range":
+        return None
+    values = angles.in_quadrants(text, origin) if described.quantity == "azimuth" else None
+    values = angles.sexagesimal(text, origin) if values is None else values
+    return None if values is None else Readings(values, _in_degrees(described))
+
+
+def _turned(each: Sequence[FloatArray], described: Column) -> Readings:
     """Azimuths from north: those from the carrier's head and its heading, or from magnetic north and the variation."""
     stated = [unit_named("azimuth", word) for word in described.written]
     units = [unit or next(filter(None, stated), described.unit) for unit in stated]
     known = any(stated)
     if units[0] == units[1] and not known:
-        return Readings(angles[0] + angles[1], described)
-    total = units[0].to_si(angles[0]) + units[1].to_si(angles[1])
+        return Readings(each[0] + each[1], described)
+    total = units[0].to_si(each[0]) + units[1].to_si(each[1])
     return Readings(total, described._replace(unit=UNITS["azimuth"]["rad"], unit_in_name=True))
 
 
@@ -222,36 +222,6 @@ def _in_degrees(described: Column) -> Column:
     return described._replace(unit=UNITS["azimuth"]["deg"], unit_in_name=True, notation="dms")
 
 
-def _joined(sign: FloatArray, degrees: FloatArray, minutes: FloatArray, seconds: FloatArray) -> FloatArray:
-    return sign * (degrees + (minutes + seconds / 60.0) / 60.0)
-
-
-def _degrees(text: pa.ChunkedArray, origin: Origin, described: Column) -> Readings | None:
-    """The angles of a column of degrees, minutes and perhaps seconds; None if it is none."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    if described.quantity == "range":
-        return None
-    fields = pc.extract_regex(text, pattern=_DMS)
-    if fields.null_count > text.null_count:
-        return None
-
-    def part(name: str) -> FloatArray:
-        cells = pc.replace_substring(pc.struct_field(fields, name), ",", ".")
-        present = numbers(pc.if_else(pc.equal(cells, ""), None, cells).cast(pa.float64()), origin)
-        return np.where(np.isfinite(degrees), np.nan_to_num(present), np.nan) if name != "deg" else present
-
-    degrees = part("deg")
-    sign = np.where(np.array([cell == "-" for cell in pc.struct_field(fields, "sign").to_pylist()]), -1.0, 1.0)
-    minutes, seconds = part("min"), part("sec")
-    wrong = (minutes >= 60) | (seconds >= 60) | (degrees > _MOST_TURN)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise origin.bad_cell(row, str(text[row]), "an angle in degrees, minutes and seconds")
-    return Readings(_joined(sign, degrees, minutes, seconds), _in_degrees(described))
-
-
 def _hundreds(text: pa.ChunkedArray, described: Column) -> Readings | None:
     """The angles of a column of mils whose hundreds stand apart, as gunners write them: 12-45; None if it is none."""
     import pyarrow as pa
@@ -287,14 +257,3 @@ def _with_units(text: pa.ChunkedArray, origin: Origin, described: Column) -> Rea
         values = values * np.array([factor.get(word, np.nan) for word in words])
         unit = si_unit(described.quantity)
     return Readings(values, described if unit is None else described._replace(unit=unit, unit_in_name=True))
-
-
-def _from_digits(values: FloatArray) -> FloatArray:
-    """(n,) degrees of numbers whose digits are degrees, minutes and seconds: 1234506.7, or 123.45067."""
-    sign: FloatArray = np.sign(values)
-    size: FloatArray = np.abs(values)
-    if size.size and np.nanmax(size) < 1000:
-        size = size * 1e4
-    size = np.round(size, 6)
-    seconds: FloatArray = size % 100
-    return _joined(sign, np.floor(size / 1e4), np.floor(size / 100) % 100, seconds)

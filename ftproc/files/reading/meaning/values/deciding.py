@@ -44,6 +44,8 @@ class Open(NamedTuple):
 def judged(log: Known, quantities: Mapping[str, FloatArray]) -> Open:
     """The columns with what their values show. quantities: (n,) in SI units, if the units of the columns are right.
     Raises InputError, a question."""
+    if (packed := _packed_without_unit(log, quantities)) is not None:
+        return packed
     moved = None if log.standard else motion.of(quantities, {q: column.unit for q, column in log.found.items()})
     sizes = plausibility.sizes(quantities, log.found)
     turned, notes = plausibility.with_other_mil(log.found, sizes)
@@ -62,6 +64,15 @@ def _counts_down(moved: motion.Motion, way: Way, elevation: Column | None) -> bo
     """Whether most of the elevations are below the horizon, and the name does not say that they are."""
     known = elevation is None or elevation.name == CANONICAL["elevation"] or elevation.key in DEPRESSIONS
     return not known and moved.elevation(way) < _BELOW_RAD
+
+
+def _packed_without_unit(log: Known, quantities: Mapping[str, FloatArray]) -> Open | None:
+    """The angles without a unit in degrees, where the digits of all of them are degrees, minutes and seconds."""
+    bare = [q for q in QUANTITIES[2:] if log.is_open(q) and not log.found[q].notation and not log.standard]
+    in_degrees = {q: column._replace(unit=UNITS[q]["deg"]) for q, column in log.found.items() if q in bare}
+    if not bare or plausibility.packed(quantities, log.found, in_degrees) != bare:
+        return None
+    return _unpacked(log, quantities, Open({**log.found, **in_degrees}))
 
 
 def _unpacked(log: Known, quantities: Mapping[str, FloatArray], open_: Open) -> Open:
