@@ -14,7 +14,7 @@ from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import readings, schema
 from ftproc.files.reading.meaning.numbers import Origin, finite, without_thousands
-from ftproc.files.reading.meaning.values import deciding, ways
+from ftproc.files.reading.meaning.values import deciding, faces, ways
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
@@ -75,6 +75,7 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
         decided[quantity] = each.column
         quantities[quantity] = each.column.unit.to_si(each.values)
         notes += each.notes
+    notes += faces.turned_back(quantities, decided)
     return Converted(quantities, decided, clock, (*marks, *notes), readings.undecided(read_here))
 
 

@@ -18,7 +18,7 @@ from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import choosing
 from ftproc.files.reading.meaning import apart, carried, rows, schema, several, statements
-from ftproc.files.reading.meaning.values import deciding, plausibility, stamps
+from ftproc.files.reading.meaning.values import deciding, faces, plausibility, stamps
 from ftproc.files.words import QUANTITIES
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -173,7 +173,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     header, found = plan.header, plan.found
     chosen, wanted = _loaded(plan), plan.positions()
     table = header.load(wanted, [*chosen[len(wanted) :], *plan.others])
-    if table.num_rows == 0:
+    if not table.num_rows:
         raise InputError(f"{header.source}: there are column names but no rows.")
     kept, notes = _kept(plan, table, chosen)
     choosing.refuse_several(header, plan.extract, kept)
@@ -192,6 +192,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if packed:  # their cells are read again
         return _at_once(plan._replace(found={**found, **packed}, notes=judged.doubts))
     quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
+    over = faces.over_the_zenith(quantities, judged.found, plan.station)
     quantities["time"], spread = stamps.spread(quantities)
     stamps.refuse_one(header, found["time"], quantities["time"])
     extra = table.select(list(range(len(chosen), table.num_columns))) if plan.others else None
@@ -207,8 +208,8 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if not one_target:
         several.refuse(header, judged.found, log)
     _refuse_apart(plan, log, QUANTITIES[1:])
-    notes = (*header.stated.notes, *notes, *converted.notes, *converted.clock.notes, *spread)
     clock = converted.clock
+    notes = (*header.stated.notes, *notes, *converted.notes, *clock.notes, *spread, *over)
     if judged.found["time"].unit != converted.found["time"].unit:
         clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
     explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged)
@@ -230,13 +231,12 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     if not plan.conditions:
         return None, ()
     header = plan.header
-    mask = rows.meeting(header, plan.conditions, table, chosen)
-    kept = np.flatnonzero(mask)
+    kept = np.flatnonzero(mask := rows.meeting(header, plan.conditions, table, chosen))
     wanted = " and ".join(str(condition) for condition in plan.conditions)
     if not kept.size:
         raise InputError(f"{header.source}: no row meets {wanted}; check the column and the value.")
-    left_out = len(mask) - len(kept)
-    return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {wanted}",)
+    out = f"{len(mask) - len(kept)} of {len(mask)} rows are left out, which do not meet {wanted}"
+    return kept.astype(np.int64), (out,)
 
 
 def _explained(

@@ -61,7 +61,8 @@ class Column(NamedTuple):
 
     @property
     def unit_is_stated(self) -> bool:
-        return self.unit_stated_by_user or self.unit_in_name or len(self.roles) > 1
+        whole = len(self.roles) > 1 and "added" not in self.roles
+        return self.unit_stated_by_user or self.unit_in_name or whole
 
 
 def resolve(

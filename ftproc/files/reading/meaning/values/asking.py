@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -12,6 +13,8 @@ from ftproc.files.reading.meaning.values.motion import Way
 from ftproc.files.reading.meaning.values.plausibility import Sizes
 from ftproc.files.reading.meaning.values.ways import Known
 from ftproc.files.words import QUANTITIES
+
+_PLUNGED_RAD = math.radians(120)  # as a zenith angle, the target would be 30 degrees below the station
 
 
 class Choice(NamedTuple):
@@ -37,12 +40,29 @@ def contradicted(
 ) -> InputError:
     """The question where the sizes of the angles or the motion contradict the names."""
     ways = [choice.way for choice in (*likely, *named_so)]
+    if plunged := _plunged(log, sizes):
+        raise plunged
     *first, last = [*_answers(log, ways), *([] if named_so else [""])]
     names_are = f", or {last} if the names are right" if named_so else ""
     why = _impossible(log, sizes) or (
         f"what the names say of {_differing_words(log, ways)} gives the target no likely motion, and another way does"
     )
     return InputError(f"{log.source}: {why}. Say {' or '.join(first)}{names_are}.")
+
+
+def _plunged(log: Known, sizes: Mapping[str, Sizes]) -> InputError | None:
+    """Where elevations are those of a telescope in its second face, or of a target far below."""
+    column, mine = log.found.get("elevation"), sizes.get("elevation")
+    if column is None or mine is None or log.is_zenith or log.is_open("elevation"):
+        return None
+    if not _PLUNGED_RAD < mine.half * column.unit.multiply / column.unit.divide < math.pi:
+        return None
+    half = f"{mine.half:.4g} {column.unit.name}"
+    return InputError(
+        f'{log.source}: half of column "{column.name}" lies beyond {half}, as in the second face of a telescope. If '
+        "so, write half a turn minus them for the elevations, and turn the azimuths by half a turn; if these are "
+        "zenith angles of a target far below the station, name the column so."
+    )
 
 
 def _impossible(log: Known, sizes: Mapping[str, Sizes]) -> str:

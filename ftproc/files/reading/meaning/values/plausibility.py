@@ -89,8 +89,14 @@ def fits(quantity: str, unit: Unit, sizes: Sizes, zenith: bool, stated: bool = F
         return sizes.half * unit.multiply / unit.divide <= most
     turn = 2 * math.pi * unit.divide / unit.multiply
     if quantity == "azimuth":
-        return sizes.half <= turn and (sizes.most <= 1.03 * turn or sizes.half <= turn / 2)
+        return (sizes.half <= turn and (sizes.most <= 1.03 * turn or sizes.half <= turn / 2)) or counts_on(unit, sizes)
     return sizes.half <= (turn / 2 if zenith else turn / 4)
+
+
+def counts_on(unit: Unit, sizes: Sizes) -> bool:
+    """Whether most azimuths are beyond a turn of the unit, and goes on from there: 359, 361, ... without a jump."""
+    turn = 2 * math.pi * unit.divide / unit.multiply
+    return not sizes.turn and sizes.most > 1.03 * turn and sizes.half <= 2 * turn
 
 
 def turns(unit: Unit, sizes: Sizes) -> bool:

@@ -39,6 +39,7 @@ _SMALL_RAD, _SMALL = 6.284, 0.05  # azimuths that are all below a turn in rad, i
 STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
 _LOW = 0.2  # elevations that are all below the zenith in rad, in another unit
 _UPRIGHT_RAD, _FEW = 1.65, 24  # beyond any elevation; angles, among which one is no rule
+_COUNTS_ON = 0.05  # azimuths that go on beyond a turn
 _OTHER_TURN = 1e-3  # azimuths that jump by the turn of another unit
 
 
@@ -185,6 +186,9 @@ def _fit(
         half_rad = mine.half * unit.multiply / unit.divide
         if quantity == "elevation" and (math.pi / 2 - half_rad if zenith else half_rad) > STEEP_RAD:
             found *= _STEEP
+        summed = "added" in log.found[column].roles
+        if quantity == "azimuth" and not (stated or summed) and plausibility.counts_on(unit, mine):
+            found *= _COUNTS_ON
         if quantity == "azimuth" and mine.turn and not plausibility.turns(unit, mine):
             found *= _OTHER_TURN
     return found
