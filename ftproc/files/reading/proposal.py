@@ -19,7 +19,7 @@ from ftproc.files.reading.clocks import notations
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import carried, schema
 from ftproc.files.reading.meaning.names import taken_apart
-from ftproc.files.reading.meaning.numbers import as_text, parsed, without_text
+from ftproc.files.reading.meaning.numbers import as_text, parsed, without_text, without_unit
 from ftproc.files.reading.meaning.questions import Proposal, Propose, answer, named
 from ftproc.files.reading.meaning.values import motion, plausibility
 from ftproc.files.units import UNITS, Unit
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _UNNAMED = ("", "index", "__index_level_0__", "Unnamed: 0")
+_OTHERS = OTHER_THINGS.union(("spd", "crs", "cse", "vel", "gs", "tas", "ias"))  # of speeds and courses
 _COUNTERS = ("", *"nik", *("no", "nr", "num", "number", "row", "index", "idx", "id", "sample", "count", "seq", "frame"))
 _ROWS = 2000
 _MOST_COLUMNS, _MOST_TRIED, _SHOWN = 60, 7, 8
@@ -219,7 +220,7 @@ def _likeliest(
 def _is_other(name: str) -> bool:
     """Whether a name says that the column is something else."""
     apart = taken_apart(name)
-    return apart.foreign or bool({apart.stem, *apart.words} & OTHER_THINGS)
+    return apart.foreign or not {apart.stem, *apart.words}.isdisjoint(_OTHERS)
 
 
 def _tries(
@@ -268,7 +269,7 @@ def _values(column: pa.ChunkedArray, header: TableHeader) -> FloatArray | None:
     """The numbers of a column; None of others."""
     values = without_text(column)
     if values is None:
-        values = parsed(as_text(column), header.decimal_comma)
+        values = parsed(without_unit(as_text(column)), header.decimal_comma)
     return None if values is None or not np.isfinite(values).any() else values
 
 

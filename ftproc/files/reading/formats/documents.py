@@ -16,6 +16,7 @@ from ftproc.files.reading.formats.sparse import Sparse
 from ftproc.files.reading.formats.standards import asterix
 
 _DEEPEST = 12  # objects inside each other
+_MOST_OF_A_VECTOR = 6  # numbers in a list inside a record
 _HELD, _REFERENCE = 64, 16  # bytes that an object or list takes in memory, and one that is in it
 _INNERMOST = re.compile(r"\[([^\[\]]+)\]")
 _BETWEEN = re.compile(r"[\s,]*")  # two documents
@@ -87,12 +88,20 @@ def _records(found: Any) -> Iterable[Mapping[str, Any]]:
     """The objects of a document, one for each reading."""
     inner = [each for each in found.values() if _is_columns(each)] if isinstance(found, Mapping) else []
     units = found.get("units") if isinstance(found, Mapping) else None
-    found = inner[0] if len(inner) == 1 and not _is_columns(found) else found
+    found = inner[0] if len(inner) == 1 and not _is_columns(found) else _without_constants(found)
     records = _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
     if not isinstance(units, Mapping) or not all(isinstance(unit, str) for unit in units.values()):
         return records
     called = {name: f"{name} [{unit}]" for name, unit in units.items()}
     return ({called.get(name, name): cell for name, cell in record.items()} for record in records)
+
+
+def _without_constants(found: Any) -> Any:
+    """The columns of an object that holds lists of values, all of one length, beside values of the whole log."""
+    if not isinstance(found, Mapping) or any(map(_holds_records, found.values())):
+        return found
+    columns = {key: value for key, value in found.items() if isinstance(value, list)}
+    return columns if _is_columns(columns) else found
 
 
 def _loaded(text: str) -> Any:
@@ -202,3 +211,5 @@ def flat(source: str, value: Any, prefix: str, depth: int) -> Iterator[tuple[str
         yield prefix, value
     elif isinstance(value, Sequence) and len(value) == 1:
         yield from flat(source, value[0], prefix, depth + 1)
+    elif prefix and 1 < len(value) <= _MOST_OF_A_VECTOR and all(isinstance(item, float | int) for item in value):
+        yield from ((f"{prefix} {k + 1}", item) for k, item in enumerate(value))
