@@ -72,6 +72,14 @@ def test_a_mount_follows_over_the_zenith(make: Make) -> None:
     assert any("are beyond the zenith" in remark for remark in log.remarks)
 
 
+def test_a_patch_of_elevations_beyond_the_zenith_turns_no_azimuths(make: Make) -> None:
+    patch = E.copy()
+    patch[20:30] = 1.8
+    log = logs.read(make(plain(el=patch)))
+    np.testing.assert_allclose(log.measurement[:, 2], patch, atol=2e-6)
+    assert angles_apart(log.measurement[:, 1], A) < 2e-6
+
+
 def test_elevations_of_a_plunged_telescope_are_no_zenith_angles(make: Make) -> None:
     said = refused(make(plain(el=np.pi - E, az=(A + np.pi) % (2 * np.pi))))
     assert "as in the second face of a telescope" in said

@@ -15,6 +15,7 @@ from ftproc.records import FloatArray
 from ftproc.settings import Station
 
 _FEWEST_IN_RUNS = 3  # cells
+_NEAR_RAD = math.radians(20)  # to the zenith: readings on both sides of it
 _LEAST_OF_A_TURN_RAD = math.radians(270)
 _FROM_RAD, _TO_RAD = math.radians(190), math.radians(350)  # 80 degrees above the horizon in both faces
 
@@ -57,12 +58,20 @@ def over_the_zenith(quantities: dict[str, FloatArray], found: Mapping[str, Colum
         return []
     elevation = quantities["elevation"]
     over = (elevation > math.pi / 2) & (elevation < math.pi)
-    if not _in_runs(over) or np.count_nonzero(over) >= len(over) / 2:
+    if not _in_runs(over) or np.count_nonzero(over) >= len(over) / 2 or not _crosses(elevation, over):
         return []
     quantities["elevation"] = np.where(over, math.pi - elevation, elevation)
     quantities["azimuth"] = np.where(over, quantities["azimuth"] - math.pi, quantities["azimuth"])
     name = found["elevation"].name
     return [f'{np.count_nonzero(over)} cells of "{name}" are beyond the zenith: the azimuths of their rows are turned']
+
+
+def _crosses(elevation: FloatArray, over: NDArray[np.bool_]) -> bool:
+    """Whether all runs beyond the zenith begin and end near it."""
+    known = np.isfinite(elevation)
+    edges = np.flatnonzero(np.diff(over[known]))
+    beside = elevation[known][np.append(edges, edges + 1)]
+    return bool((np.abs(beside - math.pi / 2) < _NEAR_RAD).all())
 
 
 def _in_runs(cells: NDArray[np.bool_]) -> bool:
