@@ -27,6 +27,9 @@ _SAME_TURN = 0.002
 _FEWEST, _FEWEST_MINUTES = 24, 3  # rows, and different minutes in them, by which packed angles are known
 
 
+FEW_ANGLES = 24  # angles, among which one is no rule
+
+
 class Sizes(NamedTuple):
     """Sizes of the angles of a column in its own unit: the median and the 99th percentile of the absolute values, the
     smallest value, the turn by which they jump, or 0, and how many there are."""
@@ -94,9 +97,9 @@ def fits(quantity: str, unit: Unit, sizes: Sizes, zenith: bool, stated: bool = F
 
 
 def counts_on(unit: Unit, sizes: Sizes) -> bool:
-    """Whether most azimuths are beyond a turn of the unit, and goes on from there: 359, 361, ... without a jump."""
+    """Whether many azimuths go on beyond a turn of the unit, 359, 361, ... without a jump."""
     turn = 2 * math.pi * unit.divide / unit.multiply
-    return not sizes.turn and sizes.most > 1.03 * turn and sizes.half <= 2 * turn
+    return not sizes.turn and sizes.rows >= FEW_ANGLES and sizes.most > 1.03 * turn and sizes.half <= 2 * turn
 
 
 def turns(unit: Unit, sizes: Sizes) -> bool:

@@ -38,7 +38,7 @@ _ZENITH, _ZENITH_BY_SURVEYORS, _EXCHANGED = 0.02, 0.5, 0.003
 _SMALL_RAD, _SMALL = 6.284, 0.05  # azimuths that are all below a turn in rad, in another unit
 STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
 _LOW = 0.2  # elevations that are all below the zenith in rad, in another unit
-_UPRIGHT_RAD, _FEW = 1.65, 24  # beyond any elevation; angles, among which one is no rule
+_UPRIGHT_RAD = 1.65  # beyond any elevation
 _COUNTS_ON = 0.05  # azimuths that go on beyond a turn
 _OTHER_TURN = 1e-3  # azimuths that jump by the turn of another unit
 
@@ -180,7 +180,7 @@ def _fit(
         small = _SMALL_RAD / (1 if quantity == "azimuth" else 4)
         if unit.name != "rad" and mine.most <= small:
             found *= _SMALL if quantity == "azimuth" else _LOW
-        upright = mine.rows < _FEW or zenith or mine.most * unit.multiply / unit.divide < _UPRIGHT_RAD
+        upright = mine.rows < plausibility.FEW_ANGLES or zenith or mine.most * unit.multiply / unit.divide < _UPRIGHT_RAD
         if quantity == "elevation" and not upright:
             found *= _SMALL
         half_rad = mine.half * unit.multiply / unit.divide
