@@ -25,8 +25,6 @@ _TURNS = {
 }  # fmt: skip
 _SAME_TURN = 0.002
 _FEWEST, _FEWEST_MINUTES = 24, 3  # rows, and different minutes in them, by which packed angles are known
-
-
 FEW_ANGLES = 24  # angles, among which one is no rule
 
 

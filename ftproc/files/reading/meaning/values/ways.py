@@ -180,7 +180,8 @@ def _fit(
         small = _SMALL_RAD / (1 if quantity == "azimuth" else 4)
         if unit.name != "rad" and mine.most <= small:
             found *= _SMALL if quantity == "azimuth" else _LOW
-        upright = mine.rows < plausibility.FEW_ANGLES or zenith or mine.most * unit.multiply / unit.divide < _UPRIGHT_RAD
+        most_rad = mine.most * unit.multiply / unit.divide
+        upright = mine.rows < plausibility.FEW_ANGLES or zenith or most_rad < _UPRIGHT_RAD
         if quantity == "elevation" and not upright:
             found *= _SMALL
         half_rad = mine.half * unit.multiply / unit.divide
