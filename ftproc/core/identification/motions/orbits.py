@@ -20,17 +20,16 @@ from ftproc.core.filtering.smoother import likelihood_of, score_log, smooth_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import RATIO_BOUND, of_level, shaped
 from ftproc.core.identification.profile import median_level
-from ftproc.core.model.earth import ECCENTRICITY2, RADIUS_M, Geodetic
+from ftproc.core.model.earth import Geodetic, earth_centred, verticals
 from ftproc.core.model.motion import EARTH_M, Motion
 from ftproc.records import FloatArray
 
 ABOVE_M = 100e3  # where the air ends
 FARTHEST_TURN = 0.005  # rad, over which the motion goes on in one step
 EARTH_RADPS = 7.292115e-5  # its rotation
-UP = np.array([0.0, 0.0, 1.0])
+AXIS_RADPS = np.array([0.0, 0.0, EARTH_RADPS])
 LATITUDES, NORTHS = np.radians([-60, -30, 0, 30, 60]), np.radians(np.arange(0, 360, 45))
 LESS_JERK = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
-STARTS = 2  # latitudes from which it is searched on: the track that comes of white jerk may be far off
 NEAR = 1e-4  # of the range: from a course farther away gravity is not followed (the first course of a satellite whose
 # ranges are read in a later half of its pass is 5 to 20 % off)
 STEPS, ROUNDS, TURNS = 12, 20, 16  # of the search for noise and jerk; of both searches; of that for the rotation
@@ -98,12 +97,11 @@ def _until_settled(track: Track, model: Model) -> Model:
 
 def earth_below(latitude: float, north: float, height_m: float = 0.0) -> FloatArray:
     """(2, 3) the earth of a `Motion` below a station at a latitude (rad), with north at an angle from x (rad)."""
-    sine, cosine = math.sin(latitude), math.cos(latitude)
-    normal_m = RADIUS_M / math.sqrt(1 - ECCENTRICITY2 * sine**2)
-    level = np.array([math.cos(north), math.sin(north), 0.0])
-    turn = EARTH_RADPS * (cosine * level + sine * UP)
-    away = normal_m * ECCENTRICITY2 * sine * cosine * level
-    return np.array([turn, away - (normal_m * (1 - ECCENTRICITY2 * sine**2) + height_m) * UP])
+    site = math.degrees(latitude), 0.0, height_m
+    sine, cosine = math.sin(north), math.cos(north)
+    axes = np.array([[sine, -cosine, 0.0], [cosine, sine, 0.0], [0.0, 0.0, 1.0]])  # east, north and up
+    found: FloatArray = np.array([AXIS_RADPS, -earth_centred(site)]) @ verticals(site).T @ axes
+    return found
 
 
 def earth_from(site: Geodetic, north: int) -> FloatArray:
