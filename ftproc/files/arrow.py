@@ -22,6 +22,16 @@ def to_numpy(column: pa.ChunkedArray) -> FloatArray:
     return np.concatenate(parts) if parts else np.empty(0)
 
 
+def to_numbers(column: pa.ChunkedArray) -> NDArray[Any] | None:
+    """(n,) float64 or int64 of a column of numbers, NaN where missing; None of another one, or of missing integers."""
+    import pyarrow as pa
+
+    if pa.types.is_float64(column.type):
+        return to_numpy(column)
+    whole = pa.types.is_integer(column.type) and not column.null_count
+    return np.array(column.to_pylist(), np.int64) if whole else None
+
+
 def _chunk(chunk: pa.Array) -> FloatArray:
     validity, data = chunk.buffers()
     rows = slice(chunk.offset, chunk.offset + len(chunk))
@@ -56,6 +66,15 @@ def _from_numpy(values: NDArray[Any]) -> pa.Array:
     kinds = {"f8": pa.float64(), "i8": pa.int64(), "u1": pa.uint8()}
     plain = np.ascontiguousarray(values)
     return pa.Array.from_buffers(kinds[plain.dtype.str[1:]], len(plain), [None, pa.py_buffer(plain)])
+
+
+def as_text(values: FloatArray) -> list[str]:
+    """Numbers (n,) as a CSV file has them, nothing for NaN."""
+    import pyarrow as pa
+
+    missing = np.isnan(values).tolist()
+    cells = _from_numpy(values).cast(pa.string()).to_pylist()
+    return ["" if none else cell for cell, none in zip(cells, missing, strict=True)]
 
 
 def table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:

@@ -5,9 +5,13 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
+import itertools
 import re
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, cast
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.errors import OutputError
 from ftproc.files import arrow
@@ -15,6 +19,7 @@ from ftproc.files import arrow
 if TYPE_CHECKING:
     import pyarrow as pa
 
+FEW = 64  # rows, which are written faster by `few_rows`
 _CELLS_AT_ONCE = 1 << 21  # of text held in memory
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 #: Characters that show nothing, which a spreadsheet may drop before it looks for a formula: controls, blanks, formats
@@ -50,6 +55,16 @@ def pieces(table: pa.Table, with_header: bool = True) -> Iterator[bytes]:
         except pa.ArrowException as error:  # such as a kept column of lists
             raise OutputError(f"This cannot be written as CSV ({error}); give the output the name .parquet.") from error
         yield cast(bytes, sink.getvalue().to_pybytes())
+
+
+def few_rows(columns: Sequence[NDArray[Any]]) -> bytes:
+    """The lines of columns (n,) of numbers, as `pieces` makes them: quick where n is small."""
+    texts = iter(arrow.as_text(np.concatenate([column for column in columns if column.dtype.kind == "f"])))
+    cells = [
+        list(itertools.islice(texts, len(column))) if column.dtype.kind == "f" else map(str, column.tolist())
+        for column in columns
+    ]
+    return "".join(f"{','.join(row)}\n" for row in zip(*cells, strict=True)).encode()
 
 
 def no_formula(text: str) -> str:

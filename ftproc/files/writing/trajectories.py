@@ -18,7 +18,7 @@ import numpy as np
 from ftproc.errors import encodable
 from ftproc.files import arrow, layout, remote
 from ftproc.files.layout import METADATA_KEY, Target, sidecar
-from ftproc.files.writing import atomic, maps, tables
+from ftproc.files.writing import atomic, csvtext, maps, tables
 from ftproc.long_records import joined
 from ftproc.records import Trajectory
 
@@ -35,6 +35,33 @@ def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
     The columns of `trajectory.extra` follow, with their own types; the metadata are JSON under the key `ftproc`.
     without: columns to leave out. Raises UsageError if an extra column has the name of one of `layout.TRAJECTORY`.
     """
+    arrays = {name: array for name, array in _columns(trajectory).items() if name not in without}
+    table = tables.with_extra(arrow.table(arrays), trajectory.extra)
+    return _described(table).replace_schema_metadata({METADATA_KEY: to_json(trajectory.metadata, indent=None)})
+
+
+def as_csv(trajectory: Trajectory, with_header: bool) -> bytes:
+    """The text of a CSV file, without its metadata: quick where the rows are few, as those of a stream."""
+    columns, extra = _columns(trajectory), trajectory.extra
+    if not with_header and len(trajectory) <= csvtext.FEW:
+        added = [] if extra is None else [arrow.to_numbers(column) for column in extra.columns]
+        numbers = [each for each in added if each is not None]
+        if len(numbers) == len(added):
+            return csvtext.few_rows([*columns.values(), *numbers])
+    return b"".join(csvtext.pieces(tables.with_extra(arrow.table(columns), extra), with_header))
+
+
+def as_json_lines(trajectory: Trajectory) -> bytes:
+    """An object a row, without the metadata; null for what is not estimated."""
+    columns = {name: column.tolist() for name, column in _columns(trajectory).items()}
+    if trajectory.extra is not None:
+        columns |= trajectory.extra.to_pydict()
+    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    return b"".join(json.dumps(plain(row)).encode() + b"\n" for row in rows)
+
+
+def _columns(trajectory: Trajectory) -> dict[str, Any]:
+    """The columns (n,) that every trajectory has."""
     groups: tuple[tuple[Sequence[str], Any], ...] = (
         (layout.MEASUREMENT, trajectory.measurement),
         (layout.STATE, trajectory.state),
@@ -47,9 +74,7 @@ def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
     arrays: dict[str, Any] = {"row": np.asarray(trajectory.row, np.int64), "time_s": trajectory.time_s}
     for names, group in groups:
         arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
-    arrays = {name: array for name, array in arrays.items() if name not in without}
-    table = tables.with_extra(arrow.table(arrays), trajectory.extra)
-    return _described(table).replace_schema_metadata({METADATA_KEY: to_json(trajectory.metadata, indent=None)})
+    return arrays
 
 
 def _described(table: pa.Table) -> pa.Table:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import gzip
-import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -15,7 +14,7 @@ from typing import Any, BinaryIO, Protocol
 from ftproc.errors import OutputError, UsageError
 from ftproc.files import layout, remote
 from ftproc.files.layout import Target, sidecar
-from ftproc.files.writing import atomic, csvtext, outputs, tables, trajectories
+from ftproc.files.writing import atomic, outputs, tables, trajectories
 from ftproc.live.outputs.parquet import GrowingParquet
 from ftproc.long_records import joined
 from ftproc.records import Trajectory
@@ -196,13 +195,9 @@ class _Text:
             stream.truncate(stream.seek(self._size))
 
     def add(self, part: Trajectory) -> None:
-        table = trajectories.to_table(part)
-        if self._as_json:
-            rows = (json.dumps(trajectories.plain(row)).encode() + b"\n" for row in table.to_pylist())
-            self.write(b"".join(rows))
-        else:
-            self.write(b"".join(csvtext.pieces(table, self._with_header)))
-            self._with_header = False
+        as_json = self._as_json
+        self.write(trajectories.as_json_lines(part) if as_json else trajectories.as_csv(part, self._with_header))
+        self._with_header = False
 
     def write(self, data: bytes) -> None:
         try:
