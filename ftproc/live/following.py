@@ -15,6 +15,7 @@ from ftproc.live.stop import Source, Stop
 from ftproc.live.stream import Stream
 from ftproc.records import Trajectory
 
+SOON_S = 0.003  # before rows are due, what may take a while is not begun
 MOMENT_S = 0.5  # at the latest between two moments
 
 
@@ -58,6 +59,8 @@ class Following:
 
     def _follow(self, source: Source) -> Iterator[Trajectory | None]:
         while self.stream.fault is None:
+            if self.stream.due_s - self.now_s > SOON_S:
+                self.stream.work()
             data = self._polled(source)
             now_s = self.now_s
             if source.news:

@@ -57,10 +57,10 @@ _KINDS: dict[str, Any] = {
         forms.Cycle, plots.Plots,
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, pieces.Flown, readings.Labels,
-        readings.Repeats, rows.Waiting, rows.Published, records.Model, records.Start, smoother.SmootherRun,
-        two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion, motion.Jolts, beside.Rates,
-        Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,
-        records.FilterRun,
+        readings.Repeats, rows.Waiting, rows.Published, rows.Smoothed, records.Model, records.Start,
+        smoother.SmootherRun, two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion,
+        motion.Jolts, beside.Rates, Prior, times.Times, times.Pause, turning.Second, turning.Turning,
+        correction.LiveCorrection, records.FilterRun,
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}

@@ -109,6 +109,11 @@ class Stream:
             if self._pauses[name].due_s(track, self.coast_s) <= now_s:
                 yield from self._named(name, self._pauses[name].coast(track))
 
+    def work(self) -> None:
+        """Do now what the next rows would have to wait for."""
+        for track in self.tracks.values():
+            track.work()
+
     @property
     def due_s(self) -> float:
         """When there is something to do, by the clock."""

@@ -3,17 +3,42 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from ftproc.core.editing.two_pass import Known
+from ftproc.core.filtering.initialization import FEWEST_READINGS
+from ftproc.core.live.beside import RATE
 from ftproc.core.live.pace import WINDOW_SAMPLES, WORK_S
+from ftproc.core.live.pieces import Sizes
+from ftproc.core.live.rows import Waiting, with_stand_ins
 from ftproc.core.live.window import Window
 
 AGAIN_S, GROWTH = 0.5, 0.2  # between edits: so long, or this share of the time since it is in doubt,
 SAMPLES = 3  # and so many samples
 NEWEST, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
+PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
+ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was seldom seen
 LARGEST_SIGMA = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
+
+
+def track_of(waiting: Waiting, known: Known, sizes: Sizes, kind: Callable[..., Window]) -> Window | None:
+    """The track of some readings, edited, in a window of that kind; None where they do not agree on one."""
+    seen = np.isfinite(waiting.measurement[:, :RATE]).sum(0)
+    few = seen < FEWEST_READINGS
+    if seen.sum() < 2 * FEWEST_READINGS or ((few & (seen > 0)).any() and len(waiting.time_s) < PATIENCE):
+        return None
+    absent = tuple(np.flatnonzero(seen == 0).tolist())
+    sigma = np.where(few & np.isnan(known.sigma), ASSUMED_SIGMA, known.sigma)
+    readings = with_stand_ins(waiting.measurement, absent)
+    window = kind(waiting.time_s, readings, known._replace(sigma=sigma), sizes, absent)
+    try:
+        window.edit()
+    except ValueError:  # a component has too few readings that agree
+        return None
+    return window if is_track(window) else None
 
 
 def is_track(window: Window) -> bool:

@@ -9,36 +9,25 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS
 from ftproc.core.filtering.records import Model
-from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.live import beside
-from ftproc.core.live.doubt import Doubt, is_track
-from ftproc.core.live.pace import WINDOW_SAMPLES, Clock, pace_of
+from ftproc.core.live.doubt import Doubt, track_of
+from ftproc.core.live.pace import WINDOW_SAMPLES, Clock, pace_of, samples_between_edits
 from ftproc.core.live.pieces import BLOCK, CROWD
-from ftproc.core.live.rows import (
-    LATELY,
-    Published,
-    Waiting,
-    widened,
-    with_stand_ins,
-    without_estimate,
-    without_what_is_lost,
-)
+from ftproc.core.live.rows import Published, Smoothed, Waiting, with_estimate, with_stand_ins, without_estimate
 from ftproc.core.live.window import Window
 from ftproc.records import FloatArray
 
 FEWEST = 16  # samples before a track may be confirmed,
 GROWTH = 1.25  # and times as many at the next attempt
-PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
-ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was seldom seen
-YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is edited when it has grown by this share, but not
-# sooner and not later than after so many samples, or while the track is in doubt
+OLD = 64  # samples, after which rows leave before all of the window is edited, as it seldom tells much of them
+NEARLY_S = 1e-6  # by which times may be rounded
 STALE = 4  # times what a window keeps, after which an edit of all of it that is still under way is given up
 
 
@@ -58,9 +47,10 @@ class LiveEditor:
         self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is edited,
         self.urgent = False  # at once
         self.refreshed = 0  # rows that the last refresh has seen
+        self.held = Waiting.nothing()  # rows that are taken when there is something to do
+        self.put_off = False  # whether there may be something to do before the next row is taken
         self.pace, self.clock = pace_of(np.empty(0), lag_s), Clock()
-        # The newest part, from this row on, with its labels, if there is a lag.
-        self.smoothed: tuple[int, SmootherRun, FloatArray] | None = None
+        self.smoothed: Smoothed | None = None  # the newest part, if there is a lag
 
     @property
     def model(self) -> Model:
@@ -69,15 +59,23 @@ class LiveEditor:
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
         """Take the next rows, time_s (n,) in order, measurement (n, 3) or (n, 4) with range rates; those that leave."""
-        measurement = beside.widened(measurement)
+        rows = self.held.with_rows(time_s, beside.widened(measurement))
+        if self._can_wait(rows):
+            self.held = rows
+            return self._due(float(time_s[-1]) + NEARLY_S)
+        self.held = Waiting.nothing()
+        return self._taken(*rows)
+
+    def _taken(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
         found: list[Published] = []
         low = 0
         while low < len(time_s):
+            self.work()
             if self.window is None:
                 high = low + 1
-                found += self._due(float(time_s[low]))
+                found += self._due(float(time_s[low]) - NEARLY_S)
                 self.waiting = self.waiting.without(self.published - self._first, WINDOW_SAMPLES[1])
-                self.waiting = self.waiting.with_row(time_s[low:high], measurement[low:high])
+                self.waiting = self.waiting.with_rows(time_s[low:high], measurement[low:high])
                 self.count, self.clock = self.count + high - low, self.clock.after(time_s[low:high])
                 if self.count >= self.next_edit and not self.clock.stands:
                     self._confirm()
@@ -88,7 +86,8 @@ class LiveEditor:
                 found += self._before_a_pause(self.window, float(time_s[low]))
                 high = self._slice_end(time_s, measurement, low)
                 if self.lag_s > 0:
-                    found += self._due(float(time_s[high - 1]))
+                    taken_s = float(time_s[high - 2]) if high - low > 1 else -math.inf
+                    found += self._due(max(taken_s + NEARLY_S, float(time_s[high - 1]) - NEARLY_S))
                 if self._is_blinded(self.window, float(time_s[low])):
                     self._begin_again()
                     continue
@@ -96,31 +95,40 @@ class LiveEditor:
                 self.count, self.clock = self.count + high - low, self.clock.after(time_s[low:high])
                 if self.lag_s == 0:  # what an edit finds out is known from the newest row on
                     found += self._leave(self.count - 1)
-                self._take_turn(self.window)
-            if self.lag_s == 0:
-                found += self._leave(self.count)
+                self.put_off = True
+                if self.lag_s == 0 or self._presses(self.window):
+                    self.work()
+                if self.lag_s > 0 and self.count >= self.next_refresh and not self.clock.stands:
+                    self._refresh(self.window)
+            found += self._leave(self.count) if self.lag_s == 0 else self._due(float(time_s[high - 1]) + NEARLY_S)
             low = high
         return found
+
+    def work(self) -> None:
+        """Do what was put off, if anything was: now or with the next push, which comes to the same."""
+        if self.put_off and self.window is not None:
+            self._take_turn(self.window)
+        self.put_off = False
 
     def tick(self, now_s: float) -> list[Published]:
         """The rows whose lag has passed at a time, of which no reading comes: they are those that leave with the next
         reading after it. What follows is the same as without: where a refresh is needed, a copy makes it."""
-        kept = self.waiting.time_s if self.window is None else self.window.time_s
-        unseen = kept[self.refreshed - self._first :]
-        if self.window is None or self.lag_s == 0 or not len(unseen) or now_s <= unseen[0] + self.lag_s:
+        self.work()
+        if self.window is None or self.lag_s == 0 or not self._rows_due(self._unseen[:1], now_s):
             return self._due(now_s)
         ahead = copy.deepcopy(self)
-        assert ahead.window is not None
-        ahead._refresh(ahead.window)
-        found = ahead._due(now_s)
+        found = ahead.finish(now_s)
         self.published = ahead.published
         return found
 
-    def finish(self) -> list[Published]:
-        """The rows that wait, when no more come."""
+    def finish(self, now_s: float = math.inf) -> list[Published]:
+        """The rows that wait, up to this time, when no more come."""
+        rows, self.held = self.held, Waiting.nothing()
+        found = self._taken(*rows)
+        self.work()
         if self.window is not None and self.lag_s > 0:
             self._refresh(self.window)
-        return self._leave(self.count)
+        return found + (self._due(now_s) if now_s < math.inf else self._leave(self.count))
 
     # -- the track's beginning --------------------------------------------------------------------------------------
 
@@ -128,23 +136,12 @@ class LiveEditor:
         """Begin a track, if the readings so far agree on one."""
         self.next_edit = self.count + int(len(self.waiting.time_s) * (GROWTH - 1)) + 1
         self.pace = pace_of(self.waiting.time_s, self.lag_s)
-        seen = np.isfinite(self.waiting.measurement[:, : beside.RATE]).sum(0)
-        few = seen < FEWEST_READINGS
-        if seen.sum() < 2 * FEWEST_READINGS or ((few & (seen > 0)).any() and len(self.waiting.time_s) < PATIENCE):
+        window = track_of(self.waiting, self.known, self.pace.sizes, self.kind)
+        if window is None:
             return
-        self.absent = tuple(np.flatnonzero(seen == 0).tolist())
-        sigma = np.where(few & np.isnan(self.known.sigma), ASSUMED_SIGMA, self.known.sigma)
-        readings, known = with_stand_ins(self.waiting.measurement, self.absent), self.known._replace(sigma=sigma)
-        window = self.kind(self.waiting.time_s, readings, known, self.pace.sizes, self.absent)
-        try:
-            window.edit()
-        except ValueError:  # a component has too few readings that agree
-            return
-        if not is_track(window):
-            return
-        self.window, self.confirmed_once = window, True
+        self.window, self.absent, self.confirmed_once = window, window.stand_ins, True
         self.waiting = Waiting.nothing()
-        self.next_edit = self.count + self._samples_between_edits(window)
+        self.next_edit = self.count + samples_between_edits(self.count, window.learns)
         self._edited(window)
 
     def _begin_again(self) -> None:
@@ -163,10 +160,24 @@ class LiveEditor:
         """Number of the first row that is kept."""
         return self.count - len(self.waiting.time_s if self.window is None else self.window)
 
+    @property
+    def _unseen(self) -> FloatArray:
+        """The times of the rows that no refresh has seen."""
+        assert self.window is not None
+        return np.append(self.window.time_s[self.refreshed - self._first :], self.held.time_s)
+
+    def _can_wait(self, rows: Waiting) -> bool:
+        """Whether there is nothing to do yet with the next rows, but to let others leave."""
+        window, n = self.window, len(rows.time_s)
+        if window is None or self.lag_s == 0 or self.count + n >= self._next_turn(window):
+            return False
+        gap = rows.time_s[0] - window.time_s[-1] > self.pace.longest_s
+        return not gap and self._slice_end(*rows, 0) == n
+
     def _before_a_pause(self, window: Window, time_s: float) -> list[Published]:
         """Where a row that no refresh has seen must leave before this time: those before it; and a refresh."""
-        unseen = window.time_s[self.refreshed - self._first :]
-        if self.lag_s == 0 or not len(unseen) or time_s <= unseen[0] + self.lag_s:
+        unseen = self._unseen[:1]
+        if self.lag_s == 0 or not self._rows_due(unseen, time_s - NEARLY_S):
             return []
         found = self._due(float(unseen[0]) + self.lag_s)
         self._refresh(window)
@@ -177,12 +188,8 @@ class LiveEditor:
         was absent, or where a row must leave that no refresh has seen."""
         assert self.window is not None
         due = min(max(self._next_turn(self.window) - self.count, 1), len(time_s) - low)
-        high = low + self.clock.rows_to_turn(time_s[low:], due)
-        if self.lag_s > 0:
-            unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
-            high = low + int(np.searchsorted(time_s[low:high], unseen[0] + self.lag_s, side="right"))
-        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.pace.longest_s)
-        high = low + int(gaps[0]) + 1 if len(gaps) else high
+        until_s = np.append(self._unseen, time_s[low])[0] + self.lag_s + NEARLY_S if self.lag_s > 0 else math.inf
+        high = low + self.clock.rows_to_turn(time_s[low:], due, until_s, self.pace.longest_s)
         seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
         return low + int(seen[0]) if len(seen) else high
 
@@ -195,6 +202,10 @@ class LiveEditor:
     def _next_turn(self, window: Window) -> int:
         """How many rows there are when there is something to do again."""
         return min(self.next_refresh, self.next_edit if window.under_way is None else self.next_work)
+
+    def _presses(self, window: Window) -> bool:
+        """Whether rows that leave now must wait for what is found out: where a track is young, or in doubt."""
+        return self.count >= self._next_turn(window) and (self.count < OLD or window.in_doubt())
 
     def _take_turn(self, window: Window) -> None:
         if len(window) > STALE * (self.pace.sizes.window + BLOCK):
@@ -212,7 +223,7 @@ class LiveEditor:
         if window.under_way is None and (doubted or self.count >= self.next_edit):
             self.doubted, self.next_work = in_doubt, self.count
             self.urgent = in_doubt and self.doubt.is_urgent(window)
-            self.next_edit = self.count + self._samples_between_edits(window)
+            self.next_edit = self.count + samples_between_edits(self.count, window.learns)
             self.pace = pace_of(window.time_s, self.lag_s)
             window.sizes = self.pace.sizes
             window.trim()
@@ -236,9 +247,6 @@ class LiveEditor:
                 window.reacquired.append(len(window) - 1)
             self._edited(window)
 
-    def _samples_between_edits(self, window: Window) -> int:
-        return int(np.clip(YOUNG * self.count, SOONEST, ROUND)) if window.learns else BLOCK
-
     def _edited(self, window: Window) -> None:
         self.doubt = self.doubt.after_edit(window, self.count)
         self._seen(window)
@@ -253,14 +261,12 @@ class LiveEditor:
         self.refreshed, self.next_refresh = self.count, self.count + every
         if self.lag_s > 0:
             _, labels = window.shown(window.near, len(window))
-            self.smoothed = self._first + window.near, window.smoothed(), labels
-
-    # -- what leaves ------------------------------------------------------------------------------------------------
+            self.smoothed = Smoothed(self._first + window.near, window.smoothed(), labels)
 
     def _due(self, now_s: float) -> list[Published]:
         """The rows whose lag has passed at a time, or that are too many to wait for it."""
         kept = self.waiting.time_s if self.window is None else self.window.time_s
-        due = int(np.searchsorted(kept[self.published - self._first :] + self.lag_s, now_s, side="left"))
+        due = self._rows_due(kept[self.published - self._first :], now_s)
         crowd = self.count - self.published - self.pace.sizes.most_waiting
         most = self.count if self.window is None else self.refreshed
         found = self._leave(min(self.published + max(due, crowd), most))
@@ -268,33 +274,22 @@ class LiveEditor:
             self.window.left = self.published - self._first
         return found
 
+    def _rows_due(self, time_s: FloatArray, now_s: float) -> int:
+        """How many of the rows at these times their lag has passed for."""
+        return int(np.searchsorted(time_s + self.lag_s, now_s, side="left"))
+
     def _leave(self, stop: int) -> list[Published]:
         """The rows before this one; those from before the track have no estimate."""
-        begins = self.count if self.window is None else 0 if self.smoothed is None else self.smoothed[0]
-        return [*self._without_estimate(min(begins, stop)), *self._with_estimate(stop)]
-
-    def _without_estimate(self, stop: int) -> Iterator[Published]:
-        low, n = self.published - self._first, stop - self.published
-        if n > 0:
-            kept = self.waiting.measurement if self.window is None else self.window.came
-            yield without_estimate(self.published, kept[low : low + n])
-            self.published = stop
-
-    def _with_estimate(self, stop: int) -> Iterator[Published]:
-        first, n = self.published, stop - self.published
-        if n <= 0:
-            return
-        assert self.window is not None
-        window, low = self.window, first - self._first
-        before = min(LATELY - 1, low)
-        rows, label = window.shown(low - before, low + n)
-        rows, label = widened(rows, before), label[before:]
-        if self.smoothed is not None:
-            begin, smoothed, labels = self.smoothed
-            label = labels[first - begin : stop - begin].copy()
-            for name in ("state", "sigma", "los_sigma", "path_sigma"):
-                rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
-        label[:, list(self.absent)] = 3.0
-        again = np.isin(np.arange(low, low + n), window.reacquired)
-        yield Published(first, rows, label, without_what_is_lost(rows), again, self.absent)
-        self.published = stop
+        begins = self.count if self.window is None else 0 if self.smoothed is None else self.smoothed.first
+        found: list[Published] = []
+        for end in (min(begins, stop), stop):
+            if end > self.published:
+                samples = slice(self.published - self._first, end - self._first)
+                if end <= begins:
+                    kept = self.waiting.measurement if self.window is None else self.window.came
+                    found.append(without_estimate(self.published, kept[samples]))
+                else:
+                    assert self.window is not None
+                    found.append(with_estimate(self.window, self.published, samples, self.absent, self.smoothed))
+                self.published = end
+        return found

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc.core.filtering.initialization import shortest_gap
-from ftproc.core.live.pieces import CROWD, Sizes
+from ftproc.core.live.pieces import BLOCK, CROWD, Sizes
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
@@ -20,6 +20,8 @@ WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the
 NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
 SHORTEST_S, SELDOM = 1e-4, 64  # interval of any instrument; shorter ones count where no others come once in so many
 TICK_S, STANDING = 1e-3, 4  # of the clock, and rows in a tick, after which it stands still
+YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is edited when it has grown by this share, but not
+# sooner and not later than after so many samples, or while the track is in doubt
 MOST_IN_LAG = 100_000  # samples, that the window is made for
 
 
@@ -47,6 +49,11 @@ def pace_of(time_s: FloatArray, lag_s: float) -> Pace:
     return Pace(sizes, shortest_gap(interval_s), refresh, turn, work)
 
 
+def samples_between_edits(count: int, learns: bool) -> int:
+    """Of all of the window, after so many samples. learns: whether there is more to find out than what is rejected."""
+    return int(np.clip(YOUNG * count, SOONEST, ROUND)) if learns else BLOCK
+
+
 class Clock(NamedTuple):
     """The newest tick, and how many rows have come in it."""
 
@@ -64,11 +71,14 @@ class Clock(NamedTuple):
         same = len(time_s) - int(np.searchsorted(time_s // TICK_S, tick))
         return Clock(float(tick), same + (self.rows if same == len(time_s) and tick == self.tick else 0))
 
-    def rows_to_turn(self, time_s: FloatArray, rows: int) -> int:
+    def rows_to_turn(self, time_s: FloatArray, rows: int, until_s: float, longest_s: float) -> int:
         """How many of the next rows, with times (n,), are taken before a turn that is due after so many: one more
-        than come in the same tick, or as many as make up a CROWD, where the clock stands still then."""
+        than come in the same tick, or as many as make up a CROWD, where the clock stands still then. None after a time,
+        and none after a longer interval than this."""
         then = self.after(time_s[:rows])
-        if not then.stands or then.rows % CROWD == 0:
-            return rows
-        goes_on = int(np.searchsorted(time_s // TICK_S, then.tick, side="right")) + 1
-        return min(rows + CROWD - then.rows % CROWD, goes_on, len(time_s))
+        if then.stands and then.rows % CROWD != 0:
+            goes_on = int(np.searchsorted(time_s // TICK_S, then.tick, side="right")) + 1
+            rows = min(rows + CROWD - then.rows % CROWD, goes_on, len(time_s))
+        rows = int(np.searchsorted(time_s[:rows], until_s, side="right"))
+        gaps = np.flatnonzero(np.diff(time_s[:rows]) > longest_s)
+        return int(gaps[0]) + 1 if len(gaps) else rows

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import ROW, empty_rows
+from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.live.beside import WIDTH
+from ftproc.core.live.window import Window
 from ftproc.records import FloatArray
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: of what was never seen
@@ -44,13 +46,38 @@ class Waiting(NamedTuple):
     def nothing(cls) -> Waiting:
         return cls(np.empty(0), np.empty((0, WIDTH)))
 
-    def with_row(self, time_s: FloatArray, measurement: FloatArray) -> Waiting:
+    def with_rows(self, time_s: FloatArray, measurement: FloatArray) -> Waiting:
         return Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
 
     def without(self, left: int, kept: int) -> Waiting:
         """Without the first of those that have left; so many in all are kept, and now and then twice as many."""
         drop = min(left, len(self.time_s) - kept)
         return Waiting(self.time_s[drop:], self.measurement[drop:]) if drop > kept else self
+
+
+class Smoothed(NamedTuple):
+    """Rows from this one on, as the smoother has them, with their labels."""
+
+    first: int
+    run: SmootherRun
+    label: FloatArray
+
+
+def with_estimate(
+    window: Window, first: int, samples: slice, absent: tuple[int, ...], smoothed: Smoothed | None
+) -> Published:
+    """The rows of some samples of a window. first: the number of the first. smoothed: these rows, if there is a lag."""
+    before = min(LATELY - 1, samples.start)
+    rows, label = window.shown(samples.start - before, samples.stop)
+    rows, label = widened(rows, before), label[before:]
+    if smoothed is not None:
+        found = slice(first - smoothed.first, first - smoothed.first + len(rows))
+        label = smoothed.label[found].copy()
+        for name in ("state", "sigma", "los_sigma", "path_sigma"):
+            rows[name] = getattr(smoothed.run, name)[found]
+    label[:, list(absent)] = 3.0
+    again = np.isin(np.arange(samples.start, samples.stop), window.reacquired)
+    return Published(first, rows, label, without_what_is_lost(rows), again, absent)
 
 
 def with_stand_ins(measurement: FloatArray, absent: tuple[int, ...]) -> FloatArray:

@@ -190,7 +190,8 @@ def test_rows_leave_by_the_clock_as_they_would_with_the_next_reading(flight, who
     for k, moment in enumerate(log.time_s[:-1]):
         found += editor.push(log.time_s[k : k + 1], log.measurement[k : k + 1])
         found += editor.tick(moment + 0.035)
-        assert editor.count - editor.published == (log.time_s[: k + 1] + lag_s >= moment + 0.035).sum()
+        waiting = editor.count + len(editor.held.time_s) - editor.published
+        assert waiting == (log.time_s[: k + 1] + lag_s >= moment + 0.035).sum()
         if k % 50 == 20:
             editor = copy.deepcopy(editor)
     state = np.concatenate([each.rows["state"] for each in found])
@@ -238,3 +239,24 @@ def rows_of_part(log, lag_s):
     editor = live.editor(FilterSettings(editing="live", lag_s=lag_s))
     found = [*editor.push(log.time_s, log.measurement), *editor.finish()]
     return {name: np.concatenate([each.rows[name] for each in found]) for name in ("state", "sigma")}
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 0.48, 0.5])
+def test_what_is_put_off_may_be_done_at_any_moment(flight, lag_s):
+    """Between any two readings, or with the next one; with a lag, most of it is put off, and rows need not wait for
+    it: they leave with the reading that is their lag later."""
+    log, drawn, settings = flight.log, np.random.default_rng(4), FilterSettings(editing="live", lag_s=lag_s)
+    editor, at_once = live.editor(settings), live.editor(settings).push(flight.log.time_s, flight.log.measurement)
+    found, put_off = [], 0
+    for k in range(len(log)):
+        found += editor.push(log.time_s[k : k + 1], log.measurement[k : k + 1])
+        if editor.window is not None:
+            passed = int(np.searchsorted(log.time_s, log.time_s[k] - lag_s + 1e-6, side="right"))
+            assert editor.published == passed
+        put_off += editor.put_off
+        if drawn.random() < 0.5:
+            editor.work()
+            assert not editor.put_off
+    assert (put_off > 0.1 * len(log)) == (lag_s > 0)
+    state, whole = (np.concatenate([each.rows["state"] for each in some]) for some in (found, at_once))
+    np.testing.assert_array_equal(state, whole)

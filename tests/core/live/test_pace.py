@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,7 @@ def test_turns_do_not_depend_on_how_rows_come(name, step):
         block = time_s[low : low + step]
         done = 0
         while done < len(block):
-            count = clock.rows_to_turn(block[done:], 1)
+            count = clock.rows_to_turn(block[done:], 1, math.inf, math.inf)
             clock, done = clock.after(block[done : done + count]), done + count
             if not clock.stands or clock.rows % CROWD == 0:
                 turns.append(low + done - 1)
