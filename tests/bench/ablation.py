@@ -27,6 +27,7 @@ from tests.bench import logs
 from tests.trust.runs import is_far
 
 EDITING, IDENTIFICATION = "ftproc.core.editing", "ftproc.core.identification"
+REJECTED = f"{EDITING}.lasting.rejected"
 SAME = 1e-9  # of an error: less has not changed
 HEADER = ("rule off", "logs changed", "mean error ratio", "from", "to", "confidently wrong", "time")
 
@@ -108,8 +109,9 @@ RULES: dict[str, tuple[Off, ...]] = {
     "patches as often as they are rejected": (Off(f"{EDITING}.lasting.scanned", "_runs", lambda _: np.zeros(0)),),
     "the best of all rounds": (Off(f"{EDITING}.lasting.settling", "AGILE", np.inf),),
     "the likeliest fault alone": (Off(f"{EDITING}.lasting.settling", "_likeliest", _empty),),
-    "rejected runs on a curve": (Off(f"{EDITING}.lasting.rejected_runs", "_more_than_a_curve", lambda *_: np.inf),),
-    "runs of several components as one motion": (Off(f"{EDITING}.lasting.rejected_runs", "_together", _empty),),
+    "rejected runs on a curve": (Off(f"{REJECTED}.rejected_runs", "_more_than_a_curve", lambda *_: np.inf),),
+    "patches followed beside a rejected run": (Off(f"{REJECTED}.rejected_runs", "followed", _empty),),
+    "runs of several components as one motion": (Off(f"{REJECTED}.joining", "_together", _empty),),
     "abrupt changes": (Off(f"{IDENTIFICATION}.motions.jolts", "told", _nothing),),
     "patches of several that were joined": (
         Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),

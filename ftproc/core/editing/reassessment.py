@@ -144,7 +144,9 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
             break
         decision, profile = again, again.model
     found = decision._replace(model=profile, unexamined=len(search.unexamined - search.tried))
-    if (found.weight != first.weight).any() and _likelihood(record, found) < _likelihood(record, first) - MARGIN:
+    if (found.weight != first.weight).any() and log_probability_as_it_is(record, found) < log_probability_as_it_is(
+        record, first
+    ) - MARGIN:
         return first._replace(rounds=found.rounds, unexamined=found.unexamined)
     return found
 
@@ -155,7 +157,7 @@ def _or_as_they_are(record: Record, again: Decision, tried: Decision, before: De
     if (tried.weight == before.weight).all():
         return again
     tried = tried._replace(starts=_starts(record, tried.weight, median_level(before.model)))
-    return max(again, tried._replace(model=with_profile(record, tried)), key=partial(_likelihood, record))
+    return max(again, tried._replace(model=with_profile(record, tried)), key=partial(log_probability_as_it_is, record))
 
 
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
@@ -210,10 +212,10 @@ def _may_be_motion(record: Record, decision: Decision) -> bool:
 
 def log_probability(record: Record, decision: Decision) -> float:
     """Of all readings of a log, as it is understood, with a jerk profile of its own."""
-    return _likelihood(record, decision._replace(model=with_profile(record, decision, COMPARED_STEPS)))
+    return log_probability_as_it_is(record, decision._replace(model=with_profile(record, decision, COMPARED_STEPS)))
 
 
-def _likelihood(record: Record, decision: Decision) -> float:
+def log_probability_as_it_is(record: Record, decision: Decision) -> float:
     """Log-probability of all readings, of the decisions on them, of late time stamps and of the jerk profile."""
     model, at_median = decision.model, median_level(decision.model)
     log = record.weighted(decision.weight)

@@ -29,7 +29,7 @@ from ftproc.core.editing.decisions import (
 )
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import MOTION, STEP, Faults, Shift, others, refined
-from ftproc.core.editing.lasting.rejected_runs import OPEN, reassess_rejected
+from ftproc.core.editing.lasting.rejected.rejected_runs import OPEN, reassess_rejected
 from ftproc.core.editing.lasting.settling import Understood, without_lasting
 from ftproc.core.editing.reassessment import (
     finer_noise,

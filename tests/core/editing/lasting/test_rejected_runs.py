@@ -8,8 +8,8 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import rejected_runs
-from ftproc.core.editing.lasting.rejected_runs import LENGTHS, Run
+from ftproc.core.editing.lasting.rejected import joining, rejected_runs
+from ftproc.core.editing.lasting.rejected.joining import LENGTHS, Run
 from ftproc.core.work import Work
 from ftproc.quality.verdict import SUSPECT
 from ftproc.settings import FilterSettings
@@ -44,6 +44,27 @@ def test_patches_that_were_followed(monkeypatch, seed, most_m):
     assert error_m(seed) > 1.15 * most_m
 
 
+@pytest.mark.parametrize("seed", [22, 23])
+def test_a_patch_that_was_followed_up_to_the_first_good_readings_behind_it(monkeypatch, seed):
+    """Offsets of 9 and 10 sigmas over 19 and 16 readings of an azimuth, that a manoeuvring target seems to follow: two
+    or four readings where the track leaves and returns are rejected, some of them the good ones behind the patch."""
+    flight = simulate(
+        "manoeuvre", seed=seed, dt_s=0.2, duration_s=240.0, outliers="isolated=0.03:6-300,offset=2:8-20:8-100"
+    )
+
+    def off():
+        found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+        away = np.abs(found.state[:, :3] - flight.truth.position_m) / found.sigma[:, :3]
+        missed = (flight.truth.outlier > 0) & (found.outlier == 0)
+        return float((away > 5).any(1).mean()), int(missed.sum())
+
+    assert off() == (0.0, 0)
+    monkeypatch.setattr(rejected_runs, "followed", lambda *_: ())
+    share, missed = off()
+    assert share > 0.015
+    assert missed > 12
+
+
 @pytest.mark.parametrize(("margin", "chosen"), [(43.0, "a patch of outliers"), (47.0, "motion")])
 def test_what_may_be_motion_or_a_patch_is_named(monkeypatch, margin, chosen):
     """That the ramp is a patch is likelier by 45: with a prior of about so much against it either may be."""
@@ -72,15 +93,15 @@ def test_a_launch_at_the_beginning_of_a_log_is_no_patch(monkeypatch, seed):
     error_m, outliers = off_m()
     assert error_m < 0.7
     assert outliers == 0
-    monkeypatch.setattr(rejected_runs, "_together", lambda alone: ())
+    monkeypatch.setattr(joining, "_together", lambda alone: ())
     assert off_m()[0] > 10.0
 
 
 def test_runs_that_are_rejected_at_the_same_time_are_weighed_together():
-    runs = [Run(c, np.arange(*span), np.arange(*motion)) for c, span, motion in (
+    runs = [Run(c, np.arange(*span), np.arange(*motion), True) for c, span, motion in (
         (0, (10, 30), (10, 30)), (1, (12, 34), (12, 34)), (2, (12, 34), (0, 0)), (2, (40, 60), (40, 60)),
     )]  # fmt: skip
-    (found,) = rejected_runs._together(runs)
+    (found,) = joining._together(runs)
     assert (found.component, [each.component for each in found.beside]) == (0, [1])
     assert found.key != runs[0].key
     ways = list(rejected_runs._ways(None, np.zeros((100, 3)), found, 0))
@@ -111,7 +132,7 @@ def test_ways_to_begin():
     )  # fmt: skip
     weight = np.ones((n, 3))
     weight[samples, 1] = 0.0
-    ways = [way for way, _ in rejected_runs._ways(part, weight, Run(1, samples + 1000, samples[:0]), 1000)]
+    ways = [way for way, _ in rejected_runs._ways(part, weight, Run(1, samples + 1000, samples[:0], True), 1000)]
     assert len(ways) == 1 + 4 * len(LENGTHS)
     rejected = {tuple(np.flatnonzero(way[:, 1] == 0)[[0, -1]]) for way in ways}
     assert rejected == {
@@ -119,7 +140,7 @@ def test_ways_to_begin():
         *((90 - length, 89) for length in LENGTHS), *((100, 99 + length) for length in LENGTHS),
     }  # fmt: skip
     assert all((way[:, [0, 2]] == 1).all() for way in ways)
-    taken_in, _ = next(rejected_runs._ways(part, weight, Run(1, samples, samples), 0))
+    taken_in, _ = next(rejected_runs._ways(part, weight, Run(1, samples, samples, True), 0))
     assert (taken_in == 1).all()
 
 
@@ -137,5 +158,5 @@ def test_runs_that_no_work_was_left_for_are_counted():
     (record, decision), = seen  # fmt: skip
     work = Work(0, 1, 0)
     rejected_runs.reassess_rejected(record, decision, work)
-    runs = len(list(rejected_runs._runs(record, decision, 10)))
+    runs = len(list(joining.rejected_runs(record, decision, 10)))
     assert work.passed == runs - 1

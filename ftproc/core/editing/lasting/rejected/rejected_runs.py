@@ -11,7 +11,6 @@ import contextlib
 import functools
 import itertools
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +19,8 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.between import PER_TERM, TERMS, of_any_shape
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.faults import MOTION, PATCH, Rival
+from ftproc.core.editing.lasting.rejected.followed import followed, with_weight
+from ftproc.core.editing.lasting.rejected.joining import LENGTHS, SHORTEST, Run, rejected_runs
 from ftproc.core.editing.lasting.scanned import FOLLOWED
 from ftproc.core.editing.lasting.weighing import scene_of, weighed
 from ftproc.core.editing.reassessment import (
@@ -32,57 +33,18 @@ from ftproc.core.editing.reassessment import (
 )
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
-from ftproc.core.identification.nearby import residuals_near, samples_around
+from ftproc.core.identification.nearby import samples_around
 from ftproc.core.identification.profile import median_level
-from ftproc.core.identification.stretches import runs_of
 from ftproc.core.work import Work
-from ftproc.records import FloatArray, IntArray
+from ftproc.records import FloatArray
 
-SHORTEST, ENDS = 4, 5  # readings in a run, and at its ends, of which the second nearest must be ...
-JOINED, FAR = (
-    12.0,
-    25.0,
-)  # ... such a residual at most, in units of its 1-sigma; and of one that is an outlier in any case
-SAME_SIDE = 0.7  # share of them that are on the side of the track where the one before is: noise changes sides
 SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than patches; within which either may be
 MARGIN = 6.0  # in log-probability, by which other decisions must be better: on 25 manoeuvring flights none of 18 that
 # were better by more was worse in truth, of 12 that were better by less 7
-LENGTHS = (13, 40)  # samples beside a run that may belong to a patch
 AGILE = 100.0  # times the median process noise, where the search for that of motion which begins at once begins, too
 ROUNDS, REPEATS = 2, 3  # over a log, whose runs may have changed; of deciding
 WEIGHED = 10  # times that the samples around a run are weighed, about
 ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must differ to be distinguished
-
-
-class Run(NamedTuple):
-    """A rejected run of a component: the samples (m,) of its readings, and those of them (m,) that may be motion, of
-    which there are none where it does not join the track. beside: runs of other components at the same time, which are
-    the same motion."""
-
-    component: int
-    samples: IntArray
-    motion: IntArray
-    beside: tuple[Run, ...] = ()
-
-    @property
-    def key(self) -> tuple[int, int, bytes]:
-        """What distinguishes it from others."""
-        return self.component, len(self.beside), self.samples.tobytes()
-
-    def near(self, around: int) -> slice:
-        """The samples that are weighed."""
-        reach = LENGTHS[-1] + around
-        return slice(max(int(self.samples[0]) - reach, 0), int(self.samples[-1]) + 1 + reach)
-
-    def moves(self, before: FloatArray, after: FloatArray, offset: int) -> bool:
-        """Whether other decisions (n, 3) take it for motion: they take it in, and reject nothing for it."""
-        taken_in = [after[each.motion - offset, each.component] for each in (self, *self.beside)]
-        return all(len(each) > 0 and each.mean() > 0.5 for each in taken_in) and bool((after >= before).all())
-
-    def around(self, offset: int) -> slice:
-        """The samples that are decided on, counted from one."""
-        near = self.near(0)
-        return slice(max(near.start - offset, 0), near.stop - offset)
 
 
 def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[Decision, tuple[Rival, ...]]:
@@ -92,7 +54,7 @@ def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[D
     around, found = samples_around(record.weighted(decision.weight), at_median), decision
     for _ in range(ROUNDS):
         weight = found.weight.copy()
-        for run in [each for each in _runs(record, found, around) if each.key not in seen]:
+        for run in [each for each in rejected_runs(record, found, around) if each.key not in seen]:
             near = run.near(around)
             if work.left <= 0:
                 work.passed += 1
@@ -128,29 +90,33 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     before, here = decision.weight, run.around(offset)
     unknown = before.copy()
     unknown[here, run.component] = 0.0
-    unfollowed = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
+    unfollowed = with_profile(part, with_weight(part, decision, unknown), PROFILE_STEPS)
     found, decided = {before.tobytes(): (0.0, before)}, dict[bytes, FloatArray]()
 
     @functools.cache
     def as_before() -> float:
-        return log_probability(part, _with(part, decision, before))
+        return log_probability(part, with_weight(part, decision, before))
 
-    for way, follows in _ways(part, before, run, offset):
+    for way, follows in _ways(part, before, run, offset) if len(run.samples) >= SHORTEST else ():
         with contextlib.suppress(ValueError):  # a component has too few readings there
             if follows:
-                model = with_profile(part, _with(part, decision, way), COMPARED_STEPS)
+                model = with_profile(part, with_weight(part, decision, way), COMPARED_STEPS)
                 other = _decided(part, decision._replace(weight=way), model, here, {})
             else:
                 other = _decided(part, decision._replace(weight=way), unfollowed, here, decided)
             if other.tobytes() not in found:
                 moves = run.moves(before, other, offset)
                 prior = SELDOM * (1 + len(run.beside)) if moves and (run.beside or not follows) else -MARGIN
-                found_so = _with(part, decision, other)
+                found_so = with_weight(part, decision, other)
                 gain = log_probability(part, found_so) - as_before() + prior
                 if moves and run.beside:
                     agile = found_so.model._replace(jerk=AGILE * found_so.model.jerk)
                     gain = max(gain, log_probability(part, found_so._replace(model=agile)) - as_before() + prior)
                 found[other.tobytes()] = gain, other
+    for other in followed(part, decision, run, offset, unfollowed) if run.joins else ():
+        if other.tobytes() not in found:
+            found_so = with_weight(part, decision, other)
+            found[other.tobytes()] = log_probability(part, found_so) - as_before() - MARGIN, other
     del found[before.tobytes()]
     gain, other = max(found.values(), key=lambda each: each[0], default=(-np.inf, before))
     return other, gain
@@ -162,7 +128,7 @@ def _more_than_a_curve(part: Record, decision: Decision, other: FloatArray, run:
     most = min((end - begin) // PER_TERM, TERMS[0])
     taken_in = decision.weight.copy()
     taken_in[run.samples - offset, run.component] = 1.0
-    scene = scene_of(part, _with(part, decision, taken_in), None)
+    scene = scene_of(part, with_weight(part, decision, taken_in), None)
     try:
         motion = weighed(scene, other, ())
         curve = of_any_shape(scene, weighed(scene, taken_in, [Curve(run.component, begin, end, (0.0,) * most)]))
@@ -218,54 +184,11 @@ def _decided_once(part: Record, decision: Decision, model: Model, here: slice) -
     return decided
 
 
-def _with(part: Record, decision: Decision, weight: FloatArray) -> Decision:
-    """The decision with other weights (n, 3)."""
-    return decision._replace(weight=weight, starts=starts_of(part.weighted(weight), decision.model))
-
-
 def _apart(part: Record, decision: Decision, other: FloatArray) -> bool:
     """Whether other decisions (n, 3) put the target elsewhere."""
     one, two = (
         smooth_log(part.weighted(each.weight), with_profile(part, each, COMPARED_STEPS), each.starts)
-        for each in (_with(part, decision, weight) for weight in (decision.weight, other))
+        for each in (with_weight(part, decision, weight) for weight in (decision.weight, other))
     )
     sigma = np.maximum(one.sigma[:, :3], two.sigma[:, :3])
     return bool((np.abs(one.state[:, :3] - two.state[:, :3]) > ELSEWHERE * sigma).any())
-
-
-def _runs(record: Record, decision: Decision, around: int) -> Iterator[Run]:
-    """The rejected runs of a log, those of several components together first."""
-    found, marked = list[tuple[int, IntArray, tuple[bool, bool]]](), np.zeros(len(record.time_s), bool)
-    for c in range(3):
-        seen = np.flatnonzero(record.possible[:, c])
-        runs = runs_of(decision.weight[seen, c] <= 0, SHORTEST)
-        found += [(c, seen[begin:end], (begin == 0, end == len(seen))) for begin, end in runs]
-    for _, inside, _ in found:
-        marked[inside] = True
-    residual, variance = residuals_near(record.weighted(decision.weight), decision.model, marked, around)
-    alone = list[Run]()
-    for c, inside, open_ends in found:
-        away = residual[inside, c] / np.sqrt(variance[inside, c])
-        edges = [edge for edge, is_open in zip((away[:ENDS], away[-ENDS:]), open_ends, strict=True) if not is_open]
-        joined = len(edges) > 0 and max(np.sort(np.abs(edge))[1] for edge in edges) < JOINED
-        near = (np.abs(away) < FAR) | any(open_ends)
-        above = away[near] > 0
-        same = (above[1:] == above[:-1]).sum() >= SAME_SIDE * (len(above) - 1)
-        alone.append(Run(c, inside, inside[near] if joined and same else inside[:0]))
-    yield from _together(alone)
-    yield from alone
-
-
-def _together(alone: list[Run]) -> Iterator[Run]:
-    """Runs that may be motion of one component with those of others that are rejected at about the same time."""
-    may_move = [run for run in alone if len(run.motion)]
-    for run in may_move:
-        beside = tuple(each for each in may_move if each.component > run.component and _same_time(run, each))
-        if beside and len({each.component for each in beside}) == len(beside):
-            yield run._replace(beside=beside)
-
-
-def _same_time(one: Run, other: Run) -> bool:
-    """Whether two runs are rejected together for more than half of the time of both."""
-    begins, ends = (one.samples[0], other.samples[0]), (one.samples[-1], other.samples[-1])
-    return bool(2 * (min(ends) - max(begins)) > max(ends) - min(begins))
