@@ -59,9 +59,8 @@ class Following:
 
     def _follow(self, source: Source) -> Iterator[Trajectory | None]:
         while self.stream.fault is None:
-            if self.stream.due_s - self.now_s > SOON_S:
-                self.stream.work()
-            data = self._polled(source)
+            busy = self.stream.due_s - self.now_s > SOON_S and self.stream.work()
+            data = self._polled(source, 0.0 if busy else MOMENT_S)
             now_s = self.now_s
             if source.news:
                 news, source.news = source.news, ""
@@ -76,9 +75,9 @@ class Following:
                 yield from self._done(Entry(now_s, Kind.DATA, data))
             yield None
 
-    def _polled(self, source: Source) -> bytes | None:
-        """What comes before something is due by the clock."""
-        moment_s = time.monotonic() + MOMENT_S
+    def _polled(self, source: Source, most_s: float) -> bytes | None:
+        """What comes before something is due by the clock, and before so long."""
+        moment_s = time.monotonic() + most_s
         try:
             return self.stop.read(source, min(self.stream.due_s - self._ahead_s, moment_s))
         except OSError as error:

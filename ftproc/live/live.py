@@ -150,9 +150,9 @@ class Live:
             self._order.let_leave(self._time_s[count - 1], now_s)
         return self._published(max(count, self._passed()))
 
-    def work(self) -> None:
-        """Do now what the next push would do first: for when there is time."""
-        self._order.editor.work()
+    def work(self) -> bool:
+        """Do now what the next push would do first, for when there is time; whether there was anything."""
+        return self._order.editor.work()
 
     @property
     def due_s(self) -> float:

@@ -109,10 +109,9 @@ class Stream:
             if self._pauses[name].due_s(track, self.coast_s) <= now_s:
                 yield from self._named(name, self._pauses[name].coast(track))
 
-    def work(self) -> None:
-        """Do now what the next rows would have to wait for."""
-        for track in self.tracks.values():
-            track.work()
+    def work(self) -> bool:
+        """Do now what the next rows of a track would have to wait for; whether there was anything."""
+        return any(track.work() for track in self.tracks.values())  # of the first that has something to do
 
     @property
     def due_s(self) -> float:

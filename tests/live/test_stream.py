@@ -121,6 +121,29 @@ def test_each_target_has_a_track_of_its_own():
     assert 'there is no column "whom"; its columns are time_s' in error
 
 
+def test_what_is_put_off_is_done_for_one_target_at_a_time():
+    """So that what comes meanwhile, and rows of others that are due, wait for no more than one."""
+    stream = followed(two_targets(), Recipe(settings=SETTINGS, target="track"))[0]
+    editors = [track._order.editor for track in stream.tracks.values()]
+    for editor in editors:
+        editor.put_off = True
+    assert stream.work()
+    assert [editor.put_off for editor in editors] == [False, True]
+    assert stream.work()
+    assert not stream.work()
+
+
+def test_when_it_is_done_changes_nothing():
+    def states(work):
+        stream, stop, found = Stream("-", Recipe(settings=SETTINGS, target="track"), print, 0.0), Stop(), []
+        for k, text in enumerate(two_targets()):
+            found += list(stream.take(text.encode(), 0.1 * k, stop))
+            work(stream)
+        return joined([*found, *stream.finish(stop)], "state")
+
+    np.testing.assert_array_equal(states(Stream.work), states(lambda _: None))
+
+
 def test_targets_are_bounded(monkeypatch):
     monkeypatch.setattr(streams, "MOST_TARGETS", 3)
     texts = [HEADER.replace("\n", ",who\n"), *(f"{k},1000,0.1,0.2,{k % 5}\n" for k in range(50))]

@@ -104,11 +104,12 @@ class LiveEditor:
             low = high
         return found
 
-    def work(self) -> None:
-        """Do what was put off, if anything was: now or with the next push, which comes to the same."""
-        if self.put_off and self.window is not None:
+    def work(self) -> bool:
+        """Do what was put off, now or with the next push, which comes to the same; whether anything was."""
+        put_off, self.put_off = self.put_off, False
+        if put_off and self.window is not None:
             self._take_turn(self.window)
-        self.put_off = False
+        return put_off
 
     def tick(self, now_s: float) -> list[Published]:
         """The rows whose lag has passed at a time, of which no reading comes: they are those that leave with the next
