@@ -58,7 +58,7 @@ def followed(part: Record, decision: Decision, run: Run, offset: int, model: Mod
 def _likely(part: Record, decision: Decision, model: Model, weight: FloatArray) -> float:
     """Log-probability of decisions (n, 3) by a model; none where a component has too few readings."""
     try:
-        return log_probability_as_it_is(part, with_weight(part, decision, weight)._replace(model=model))
+        return log_probability_as_it_is(part, decision._replace(weight=weight, model=model))
     except ValueError:
         return -np.inf
 

@@ -13,7 +13,8 @@ from ftproc.core.identification.nearby import residuals_near
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray, IntArray
 
-PAIR = 2  # readings in a run beside which a patch may have been followed
+PAIR, MOST_BY_CHANCE = 2, 3.0  # readings in a run beside which a patch may have been followed, and such pairs of a
+# component that isolated outliers make by chance at most
 SHORTEST, ENDS = 4, 5  # readings in one that may be anything else, and at its ends, of which the second nearest must be
 # such a residual at most, in units of its 1-sigma; and of one that is an outlier in any case:
 JOINED, FAR = 12.0, 25.0
@@ -58,7 +59,10 @@ def rejected_runs(record: Record, decision: Decision, around: int) -> Iterator[R
     found, marked = list[tuple[int, IntArray, tuple[bool, bool]]](), np.zeros(len(record.time_s), bool)
     for c in range(3):
         seen = np.flatnonzero(record.possible[:, c])
-        runs = runs_of(decision.weight[seen, c] <= 0, PAIR)
+        runs = runs_of(decision.weight[seen, c] <= 0)
+        lengths = runs[:, 1] - runs[:, 0]
+        by_chance = (lengths == 1).sum() ** 2 > MOST_BY_CHANCE * len(seen)
+        runs = runs[lengths >= (SHORTEST if by_chance else PAIR)]
         found += [(c, seen[begin:end], (begin == 0, end == len(seen))) for begin, end in runs]
     for _, inside, _ in found:
         marked[inside] = True
