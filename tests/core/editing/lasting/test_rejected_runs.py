@@ -8,7 +8,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting.rejected import joining, rejected_runs
+from ftproc.core.editing.lasting.rejected import followed, joining, rejected_runs
 from ftproc.core.editing.lasting.rejected.joining import LENGTHS, Run
 from ftproc.core.work import Work
 from ftproc.quality.verdict import SUSPECT
@@ -160,3 +160,18 @@ def test_runs_that_no_work_was_left_for_are_counted():
     rejected_runs.reassess_rejected(record, decision, work)
     runs = len(list(joining.rejected_runs(record, decision, 10)))
     assert work.passed == runs - 1
+
+
+def test_no_patch_lies_beside_a_run_where_readings_are_not_off(monkeypatch):
+    """Two good readings are rejected: without those beside them any track is as likely, but they are not off it."""
+    flight = simulate("calibration", seed=2, duration_s=60.0, dt_s=0.2, outliers="none")
+    record, decision = two_pass._decided(
+        flight.log.time_s, flight.log.measurement, UNKNOWN, None, two_pass.Work(len(flight.log)), False,
+        np.zeros(flight.log.measurement.shape, bool),
+    )  # fmt: skip
+    weight, samples = record.possible.astype(float), np.arange(90, 92)
+    weight[samples, 1] = 0.0
+    decision, run = followed.with_weight(record, decision, weight), Run(1, samples, samples[:0], True)
+    assert not list(followed.followed(record, decision, run, 0, decision.model))
+    monkeypatch.setattr(followed, "SURELY_OFF", 0.0)
+    assert list(followed.followed(record, decision, run, 0, decision.model))

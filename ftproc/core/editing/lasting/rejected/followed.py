@@ -13,9 +13,13 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.rejected.joining import SHORTEST, Run
 from ftproc.core.editing.reassessment import log_probability_as_it_is, starts_of
 from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
 BEYOND, INTO = (6, 9, 14, 20, 30, 40), (0, 1, 2, 4)  # samples of such a patch beside a run, and in it
+SURELY_OFF = 6.0  # sigmas of the noise, by which half of its readings are off: of true ones 6.8 to 17, of others, where
+# the noise is uneven and correlated, up to 5.8
 
 
 def followed(part: Record, decision: Decision, run: Run, offset: int, model: Model) -> Iterator[FloatArray]:
@@ -51,7 +55,7 @@ def followed(part: Record, decision: Decision, run: Run, offset: int, model: Mod
             near = filter(fits, [(a - step, b), (a + step, b), (a, b - step), (a, b + step)])
             other = max(near, key=likely, default=best)
             best, step = (other, step) if likely(other) > likely(best) else (best, step // 2)
-        if best is not None:
+        if best is not None and _are_off(part, decision, model, without(best), run.component, slice(*best)):
             yield without(best)
 
 
@@ -61,6 +65,13 @@ def _likely(part: Record, decision: Decision, model: Model, weight: FloatArray) 
         return log_probability_as_it_is(part, decision._replace(weight=weight, model=model))
     except ValueError:
         return -np.inf
+
+
+def _are_off(part: Record, decision: Decision, model: Model, weight: FloatArray, c: int, patch: slice) -> bool:
+    """Whether most readings of a patch are off the track by decisions (n, 3) without them."""
+    log = part.weighted(weight)
+    off = smooth_log(log, model, starts_of(log, decision.model), RESIDUALS).residual[patch, c][part.possible[patch, c]]
+    return len(off) > 0 and median(np.abs(off)) > SURELY_OFF * np.sqrt(model.noise_variance[c])
 
 
 def with_weight(part: Record, decision: Decision, weight: FloatArray) -> Decision:
