@@ -45,7 +45,7 @@ from ftproc.live import live, order, times
 from ftproc.live.lines import forms, growing, plots
 from ftproc.methods.height.priors import Prior
 
-MAGIC = b"ftproc state 1\n"
+MAGIC = b"ftproc state 2\n"
 _HEAD = struct.Struct("<Q16s")  # size and digest of what is known
 _ENTRY = struct.Struct("<dBII")  # time of the clock, kind, size, and a check of all that
 
