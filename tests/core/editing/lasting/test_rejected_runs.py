@@ -175,3 +175,7 @@ def test_no_patch_lies_beside_a_run_where_readings_are_not_off(monkeypatch):
     assert not list(followed.followed(record, decision, run, 0, decision.model))
     monkeypatch.setattr(followed, "SURELY_OFF", 0.0)
     assert list(followed.followed(record, decision, run, 0, decision.model))
+    by_hand = record._replace(accepted=np.ones(weight.shape, bool))
+    assert all((other == 1).all() for other in followed.followed(by_hand, decision, run, 0, decision.model))
+    monkeypatch.setattr(followed, "_likely", lambda *_: -np.inf)  # a component has too few readings without a patch
+    assert not list(followed.followed(record, decision, run, 0, decision.model))

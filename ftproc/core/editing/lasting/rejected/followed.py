@@ -33,7 +33,7 @@ def followed(part: Record, decision: Decision, run: Run, offset: int, model: Mod
     def without(edges: tuple[int, int]) -> FloatArray:
         other = good.copy()
         other[slice(*edges), c] = 0.0
-        return other
+        return part.with_accepted(other)
 
     @functools.cache
     def likely(edges: tuple[int, int]) -> float:
@@ -55,7 +55,9 @@ def followed(part: Record, decision: Decision, run: Run, offset: int, model: Mod
             near = filter(fits, [(a - step, b), (a + step, b), (a, b - step), (a, b + step)])
             other = max(near, key=likely, default=best)
             best, step = (other, step) if likely(other) > likely(best) else (best, step // 2)
-        if best is not None and _are_off(part, decision, model, without(best), run.component, slice(*best)):
+        if best is None or not np.isfinite(likely(best)):
+            continue
+        if _are_off(part, decision, model, without(best), c, slice(*best)):
             yield without(best)
 
 
