@@ -113,6 +113,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "patches followed beside a rejected run": (Off(f"{REJECTED}.rejected_runs", "followed", _empty),),
     "runs of several components as one motion": (Off(f"{REJECTED}.joining", "_together", _empty),),
     "abrupt changes": (Off(f"{IDENTIFICATION}.motions.jolts", "told", _nothing),),
+    "speeds that settle": (Off(f"{IDENTIFICATION}.motions.motion_models", "FADING", ()),),
     "patches of several that were joined": (
         Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),
     ),

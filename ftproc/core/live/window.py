@@ -58,7 +58,7 @@ class Window:
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.fresh = 0  # samples that no refresh has seen
         self.under_way: Whole | None = None
-        self.turning = Turning(acts=not (known.white_jerk or stand_ins))
+        self.turning = Turning(acts=not known.white_jerk)
         self.kept, self.side = Kept.nothing(), beside.Rates()
         self._bar(self._take(time_s, measurement))
 

@@ -2,13 +2,15 @@
 
 With g(p) the earth's gravity, W its rotation, and D = a - g + 2 W x v the specific force,
 
-    a' = G v - 2 W x a - W x (W x v) + w x D + b (2 v.a / s^2 - climb / H) D + white jerk
+    a' = G v - 2 W x a - W x (W x v) + w x D + b (2 v.a / s^2 - climb / H) D - c g (v.a / s^3) v + white jerk
     w = v x a / s^2      s^2 = v^2 + v0^2      G = dg/dp      b = max(-D.v / (|D| s), 0)
 
 The specific force of an aircraft turns with its velocity (w x D). What brakes also grows with the square of the speed
 and falls with the density of the air; b is its share of the force, so that a motor, the wings of an aircraft and the
-bomb that it drops follow one law. v0 lets the turn fade in hover and at rest. A model of motion is a choice of these.
-The earth is round and has the gravity of its surface; where it turns, see `gravity`.
+bomb that it drops follow one law. A speed settles where thrust meets drag, within about the time s / g in which gravity
+would change it: the acceleration along the path fades (c), in steps longer than that by a half in each kick. v0 lets
+the turn fade in hover and at rest. A model of motion is a choice of these. The earth is round and has the gravity of
+its surface; where it turns, see `gravity`.
 
 Over an interval T this is half a kick, the motion of constant acceleration, and half a kick (Strang splitting, of
 second order in T): a <- a + T/2 (f + J (x - x0)), linearised about the states x0 of a course on both sides of the
@@ -82,19 +84,23 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -
     braked = max(-vd * math.sqrt(i2 / dd), 0.0)
     turns, pressed = known * by.turns * i2, known * by.pressed * braked
     swell = pressed * (2 * va * i2 - rv * ir / SCALE_HEIGHT_M)
+    fades = by.fades * GRAVITY * math.sqrt(i2)
+    fade = fades / max(fades * h, 1.0) * i2
     v, a, d, r = (v0, v1, v2), (a0, a1, a2), (d0, d1, d2), (r0, r1, r2)
     s, b = f.slope, f.kick
     for i in range(3):
         turned = turns * (a[i] * vd - v[i] * ad)
-        f.push[i] = turned + swell * d[i] - pull * (v[i] - 3 * rv * ir2 * r[i])
+        f.push[i] = turned + swell * d[i] - pull * (v[i] - 3 * rv * ir2 * r[i]) - fade * va * v[i]
         for j in range(3):
             by_force = turns * (a[i] * v[j] - v[i] * a[j])
             grows = pressed * d[i]
             s[i, 3 + j] = by_force - turns * v[i] * d[j] + grows * 2 * i2 * v[j]
             s[i, j] = turns * a[i] * d[j] - 2 * turned * i2 * v[j] + 3 * pull * ir2 * r[i] * r[j]
             s[i, j] += grows * (2 * i2 * a[j] - 4 * va * i2 * i2 * v[j] - ir * r[j] / SCALE_HEIGHT_M)
+            s[i, j] -= fade * v[i] * (a[j] - 3 * va * i2 * v[j])
+            s[i, 3 + j] -= fade * v[i] * v[j]
         s[i, 3 + i] += turns * vd + swell
-        s[i, i] -= turns * ad + pull
+        s[i, i] -= turns * ad + pull + fade * va
     if spins:
         rotate(f, x, w0, w1, w2, turns, swell)
         flatten(f, x, r, by)

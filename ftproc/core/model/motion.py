@@ -53,13 +53,15 @@ def isotropic(jerk_psd: float) -> FloatArray:
 class Motion(NamedTuple):
     """A model of motion, whose formulas are in `forces`. acts: whether there are forces at all; without, the densities
     of the jerk are along x, y and z, else along the path, across it, and upward. turns, pressed: shares of the force
-    that turns with the velocity, and that grows with the pressure of the air. earth: its rotation, rad/s, zero where it
-    is not known, and its centre, m. course: (n, 9) the states of the samples about which it is linearised; without
+    that turns with the velocity, and that grows with the pressure of the air. fades: share of the rate, gravity by
+    speed, at which the acceleration along the path may fade. earth: its rotation, rad/s, zero where it is not known,
+    and its centre, m. course: (n, 9) the states of the samples about which it is linearised; without
     rows, about the estimate itself."""
 
     acts: bool = False
     turns: float = 0.0
     pressed: float = 0.0
+    fades: float = 0.0
     earth: Matrix = STILL
     course: Matrix = np.zeros((0, 9))
 

@@ -23,6 +23,7 @@ from tests.core.tracks import matched
 UP = np.array([0.0, 0.0, 1.0])
 TURNING = Motion(acts=True, turns=1.0)
 PRESSED = Motion(acts=True, turns=1.0, pressed=1.0)
+FADING = Motion(acts=True, turns=1.0, fades=0.8)
 SPUN = Motion(acts=True, earth=np.array([[2e-5, 3e-5, 5e-5], [1e4, -2e4, -6.36e6]]))
 
 
@@ -64,6 +65,7 @@ def force(x, by, share=None):
     tide += np.stack([flattening(p + d, w) - flattening(p - d, w) for d in beside]).T @ v / 2e3
     swells = 2 * v @ a / s2 - v @ p / r / forces.SCALE_HEIGHT_M
     share = braked(x, by) if share is None else share
+    tide -= by.fades * forces.GRAVITY * (v @ a) / s2**1.5 * v
     return tide + by.turns * np.cross(np.cross(v, a) / s2, d) + by.pressed * share * swells * d
 
 
@@ -104,7 +106,7 @@ def state(seed, speed=150.0):
     return np.r_[rng.normal(0, 4000, 3), speed * rng.normal(0, 0.6, 3), rng.normal(0, 15, 3)]
 
 
-@pytest.mark.parametrize("by", [TURNING, PRESSED, SPUN])
+@pytest.mark.parametrize("by", [TURNING, PRESSED, FADING, SPUN])
 @pytest.mark.parametrize("seed", range(3))
 def test_prediction_about_the_estimate(by, seed):
     """Half a kick at the state, and half a kick at the state that is predicted."""
@@ -129,7 +131,7 @@ def as_record(filters):
     return filters.view(np.recarray)[0]
 
 
-@pytest.mark.parametrize(("by", "seed"), [(TURNING, 1), (PRESSED, 2), (SPUN, 3)])
+@pytest.mark.parametrize(("by", "seed"), [(TURNING, 1), (PRESSED, 2), (FADING, 4), (SPUN, 3)])
 def test_the_splitting_is_of_second_order(by, seed):
     """Over a second in steps of 0.1 and 0.05 s, against the differential equation: a quarter of the error."""
     x, error = state(seed), []
@@ -141,6 +143,22 @@ def test_the_splitting_is_of_second_order(by, seed):
             forces.travel(as_record(f), by, 0, 1, 1 / steps)
         error.append(np.linalg.norm(f["x"][0] - exact))
     assert error[1] < 0.3 * error[0]
+
+
+def test_an_acceleration_along_the_path_fades_over_steps_of_any_length():
+    """As in steps of 0.01 s, but that long ones leave a quarter of it."""
+    for interval in (0.1, 1.0, 10.0, 100.0):
+        found = []
+        for steps in (1, int(100 * interval)):
+            f = zeros(FILTER)
+            f["x"][0] = 0, 0, 0, 20, 0, 0, 0.01, 0, 0
+            f["p"][0] = 1e-12 * np.eye(9)
+            for _ in range(steps):
+                forces.travel(as_record(f), Motion(acts=True, fades=1.0), 0, 1, interval / steps)
+            found.append(f["x"][0, 6])
+        fades = forces.GRAVITY * interval / np.hypot(20.0, forces.AT_REST_MPS)
+        assert 0 < found[0] < 0.01
+        assert found[0] - found[1] < 0.01 * min(0.1 * fades**2 + 0.005, 0.25)
 
 
 def forced(seed, n, by, **changes):
@@ -169,7 +187,7 @@ def steps_of(a):
     return steps
 
 
-@pytest.mark.parametrize("by", [TURNING, PRESSED, SPUN])
+@pytest.mark.parametrize("by", [TURNING, PRESSED, FADING, SPUN])
 def test_the_smoother_is_that_of_rts(by):
     a = forced(4, 60, by, dt=0.2, q=5.0, irregular=True, missing=0.2, pieces=3)
     found, steps = smoother.smooth_log(a.log, a.model, a.starts), steps_of(a)

@@ -39,6 +39,8 @@ CLOSE = 2 * MARGIN  # with less, white jerk is as good as another model, or that
 FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
 MOST_STEPS = 100  # in a gap
 LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less of it, that may be ballistic
+FADING = (0.5, 1.0)  # of gravity by speed: the rates at which the acceleration along the path may fade
+SETTLED = 4.0  # times the variance of a smoothed acceleration: that of a start which nobody doubts much
 JERK_SHARES = 10.0 ** -np.arange(8)  # of the jerk of white jerk: where the search begins for a body that nobody steers
 
 
@@ -168,7 +170,7 @@ def _fitted(
                 orbits.Track(*short[:2], known, others.earth), begin, base if len(names) > 1 else -math.inf
             )
         else:
-            model, likelihood = (_unsteered if motion.pressed else _steered)(short, begin)
+            model, likelihood = _unsteered(short, begin) if motion.pressed else _steered(short, begin, base)
         found.append(Chosen(name, model, likelihood - base, dense, own, white, row))
     return found, short.log, course
 
@@ -208,10 +210,37 @@ def falls(course: FloatArray) -> bool:
     return bool((lift < LIFT * GRAVITY).mean() > SHARE)
 
 
-def _steered(short: Logged, model: Model) -> tuple[Model, float]:
-    """The likeliest profile from this one on, with its allowance, and the likelihood."""
+def _steered(short: Logged, model: Model, base: float) -> tuple[Model, float]:
+    """The likeliest profile from this one on, with its allowance, and the likelihood. Where that is beyond a base, the
+    acceleration along the path may fade."""
     model, likelihood = climbed(*short[:2], model, STEPS, short.scales)
+    if _finite(likelihood) > base + MARGIN:
+        faded = _fading(short, model)
+        if faded.motion.fades > 0:
+            model, likelihood = climbed(*short[:2], faded, STEPS, short.scales)
     return with_allowance(short.log, model, short.scales), likelihood
+
+
+def _fading(short: Logged, model: Model) -> Model:
+    """The same with the likeliest rate at which the acceleration along the path fades. It begins as the track does:
+    else what is saved is the doubt about an acceleration that has soon faded anyway."""
+    heads = smooth_log(short.log, model, short.starts).heads
+    starts = [_settled(*each) for each in zip(short.starts, heads, strict=True)]
+    found, least = model, likelihood_of(short.log, model, starts) + MARGIN
+    for fades in FADING:
+        faded = model._replace(motion=model.motion._replace(fades=fades))
+        likelihood = _finite(likelihood_of(short.log, faded, starts))
+        if likelihood > least:
+            found, least = faded, likelihood
+    return found
+
+
+def _settled(start: Start, head: Start) -> Start:
+    """A start with the acceleration of the smoothed track, as if it were hardly known."""
+    covariance = start.covariance.copy()
+    covariance[6:], covariance[:, 6:] = 0.0, 0.0
+    covariance[6:, 6:] = SETTLED * head.covariance[6:, 6:]
+    return Start(start.sample, np.append(start.state[:6], head.state[6:]), covariance)
 
 
 def _unsteered(short: Logged, model: Model) -> tuple[Model, float]:

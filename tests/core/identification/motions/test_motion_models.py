@@ -61,6 +61,44 @@ def test_an_aircraft_that_manoeuvres_has_a_force_that_turns():
     assert velocity < 0.88
 
 
+def car(seed, acceleration_mps2=0.0):
+    """A vehicle that turns this way and that while it keeps its speed or changes it steadily; 10 Hz for 40 s, in cells
+    (400, 3) of a radar on the ground."""
+    rng, time = np.random.default_rng(seed), 0.1 * np.arange(400.0)
+    speed, heading = 6 + acceleration_mps2 * time, 1.5 * np.sin(2 * np.pi * time / 23.0 + rng.uniform(0, 6))
+    path = np.cumsum(0.1 * speed[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), 0)
+    x, y, z = *path.T + rng.uniform(15, 30, (2, 1)), np.full(400, 1.0)
+    polar = np.column_stack([np.sqrt(x**2 + y**2 + z**2), np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))])
+    return time, polar + rng.normal(size=(400, 3)) * NOISE, np.column_stack([x, y, z])
+
+
+NOISE = np.array([0.1, 5e-3, 5e-3])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_car_keeps_its_speed_better_than_its_acceleration(monkeypatch, seed):
+    (time, polar, truth), errors = car(seed), []
+    log, white = Observations(time, polar, np.ones((400, 3))), Model(NOISE**2, isotropic(1.0))
+    starts = find_starts(log, NOISE**2, 1.0)
+    white = with_allowance(log, fit_profile(log, starts, white, 3))
+    for rates in (motion_models.FADING, ()):
+        monkeypatch.setattr(motion_models, "FADING", rates)
+        found = choose(log, starts, white, Candidates(MOTIONS_TRIED))
+        assert found.name == "turning-force"
+        assert (found.model.motion.fades > 0) == (len(rates) > 0)
+        velocity = smooth_log(found.log, found.model, found.starts).state[:, 3:6]
+        errors.append(np.sqrt(((velocity - np.gradient(truth, time, axis=0))[10:-10] ** 2).mean()))
+    assert errors[0] < 0.97 * errors[1]
+
+
+def test_a_car_whose_speed_grows_steadily_does_not():
+    time, polar, _ = car(1, acceleration_mps2=0.5)
+    log, white = Observations(time, polar, np.ones((400, 3))), Model(NOISE**2, isotropic(1.0))
+    starts = find_starts(log, NOISE**2, 1.0)
+    white = with_allowance(log, fit_profile(log, starts, white, 3))
+    assert choose(log, starts, white, Candidates(MOTIONS_TRIED)).model.motion.fades == 0
+
+
 def fitted(a):
     return with_allowance(a.log, fit_profile(a.log, a.starts, level(a), 3))
 
