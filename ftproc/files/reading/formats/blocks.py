@@ -1,4 +1,4 @@
-"""A text that is too large to be read at once, block by block."""
+"""The rows of a text: block by block where it is too large to be read at once."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ftproc.errors import InputError
 from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats.layout import BLANKS
 
 _BLOCK = 8 << 20  # bytes that are parsed at once
 
@@ -34,6 +35,21 @@ def of_file(path: Path, source: str, offset: int, delimiter: str, before: os.sta
                     raise InputError(f"{source}: decimal commas and points.")
             yield from _block(source, memoryview(data)[:end])
         yield from _block(source, memoryview(rest))
+
+
+def delimited(body: memoryview, delimiter: str) -> tuple[bytes | memoryview, str]:
+    """Rows with one character between the cells, and that."""
+    if delimiter != BLANKS:
+        return body, delimiter
+    ends = rb"(?m)^[ \t]++|(?<![ \t])[ \t]++(?=\r?$)"
+    return re.sub(rb"[ \t]+", b"\t", re.sub(ends, b"", body)), "\t"
+
+
+def end(path: Path, size: int) -> bytes:
+    """The last bytes of a file."""
+    with path.open("rb") as stream:
+        stream.seek(max(path.stat().st_size - size, 0))
+        return stream.read()
 
 
 def _block(source: str, body: memoryview) -> Iterator[memoryview]:

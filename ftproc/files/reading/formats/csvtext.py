@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -59,7 +59,7 @@ def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> Ta
     text = split(name, data, widths)
     text = text._replace(form=f"{language}, {text.form}" if language else text.form)
     commas = text.delimiter != "," or len(_QUOTED_COMMA.findall(text.body, 0, _HEAD)) > 2
-    return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form, above=text.above)
+    return text.header(text.load, commas)
 
 
 def _unwrapped(data: bytes, room: limits.Room, cut: bool = False) -> tuple[str, str]:
@@ -77,25 +77,28 @@ def _described(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader
     if not head.lstrip().startswith(b"[[") and _plain(head) is not None:
         return None
     sample = encoding.as_utf8(room.name, head, cut or len(data) > len(head)).data.decode("utf-8", "replace")
-    return catalogue.read(sample, lambda: encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace"), room)
+    gone, note = (0, "") if cut else trimming.words_cut_off(data)
+    data = data[: len(data) - gone]
+    found = catalogue.read(sample, lambda: encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace"), room)
+    return found and found.noting(note)
 
 
 def _large_file(name: str, path: Path) -> TableHeader:
     before = path.stat()
     head = split(name, content.read(name, path, limit=_HEAD), cut=True)
+    _, note = trimming.cut_off(blocks.end(path, _HEAD), len(head.names), head.delimiter)
 
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         return split(name, content.read(name, path, known=before)).load(numeric, others)
 
     def in_blocks(numeric: Sequence[int]) -> Blocks | None:
-        if head.encoding:  # in which the rows are elsewhere than in UTF-8
+        if head.encoding or note:  # in which the rows are elsewhere than in UTF-8, or end before the file
             return None
         rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
         bodies = blocks.of_file(path, head.source, head.body_offset, head.delimiter, before)
         return Blocks((head._replace(body=body, odd_quotes=False).load(numeric, ()) for body in bodies), rows)
 
-    header = TableHeader(name, head.names, load, head.delimiter != ",", blocks=in_blocks, units=head.units)
-    return replace(header, form=head.form, above=head.above)
+    return replace(head._replace(note=note).header(load, head.delimiter != ","), blocks=in_blocks)
 
 
 class CsvText(NamedTuple):
@@ -103,7 +106,8 @@ class CsvText(NamedTuple):
 
     body: the rows in UTF-8. odd_quotes: an odd number of quotation marks: an unclosed one may swallow all rows after
     it. body_offset: of the body in the file, bytes. widths: of the columns, or nothing. units: a row of units.
-    encoding: if it is not UTF-8. form: the layout in words. above: the lines above the names.
+    encoding: if it is not UTF-8. form: the layout in words. above: the lines above the names. note: on
+    a row that is left out.
     """
 
     source: str
@@ -117,6 +121,11 @@ class CsvText(NamedTuple):
     encoding: str = ""
     form: str = ""
     above: Sequence[str] = ()
+    note: str = ""
+
+    def header(self, load: Callable[[Sequence[int], Sequence[int]], pa.Table], decimal_comma: bool) -> TableHeader:
+        known = TableHeader(self.source, self.names, load, decimal_comma, units=self.units, form=self.form)
+        return replace(known, above=self.above).noting(self.note)
 
     def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         """Columns `numeric`, then `others`, by position.
@@ -149,7 +158,7 @@ class CsvText(NamedTuple):
 
         keys = [str(position) for position in range(len(self.names))]
         chosen = [*numeric, *others]
-        body, delimiter = self._delimited()
+        body, delimiter = blocks.delimited(self.body, self.delimiter)
         large = len(body) > _HEAD  # a process that ends as soon as threads have begun would be aborted by them
         size = max(_PARSED, _PARSED_OF_A_COLUMN * len(keys))
         table = pyarrow.csv.read_csv(
@@ -172,13 +181,6 @@ class CsvText(NamedTuple):
                 )
         return table
 
-    def _delimited(self) -> tuple[bytes | memoryview, str]:
-        """The rows with one character between the cells."""
-        if self.delimiter != BLANKS:
-            return self.body, self.delimiter
-        ends = rb"(?m)^[ \t]++|(?<![ \t])[ \t]++(?=\r?$)"
-        return re.sub(rb"[ \t]+", b"\t", re.sub(ends, b"", self.body)), "\t"
-
     def _of_widths(self, chosen: Sequence[int]) -> pa.Table:
         import pandas as pd
         import pyarrow as pa
@@ -191,7 +193,7 @@ class CsvText(NamedTuple):
 
     def _refuse_ragged(self) -> None:
         """Raise InputError for the first row with a wrong number of cells, found in plain Python."""
-        body, delimiter = self._delimited()
+        body, delimiter = blocks.delimited(self.body, self.delimiter)
         text = io.TextIOWrapper(io.BytesIO(body), encoding="utf-8", errors="replace", newline="")
         rows = (cells for cells in csv.reader(text, delimiter=delimiter) if cells)
         row = -1
@@ -236,8 +238,8 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
     widths = found.widths
     body = memoryview(text.data)[start:]
     if not cut:
-        body, dropped = trimming.rows_only(source, body, found.names, found.delimiter, widths)
-        found = found._replace(form=found.form + behind + dropped)
+        body, dropped, note = trimming.rows_only(source, body, found.names, found.delimiter, widths)
+        found = found._replace(form=found.form + behind + dropped, note=note)
     odd = text.data.count(b'"', start) % 2 == 1
     separated = f"text, separated by {_SEPARATOR_NAMES[found.delimiter]}" if not widths else "text in fixed widths"
     form = ", ".join(part for part in (text.was and f"{text.was}", separated, found.form) if part)

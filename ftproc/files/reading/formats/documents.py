@@ -10,7 +10,7 @@ from typing import Any
 
 from ftproc.errors import InputError
 from ftproc.files import limits
-from ftproc.files.reading.formats import content, encoding
+from ftproc.files.reading.formats import content, encoding, trimming
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
 from ftproc.files.reading.formats.standards import asterix
@@ -26,14 +26,14 @@ _VALUES = ("val", "value")  # keys under which decoders put the value of an item
 
 def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
     """A .json, .jsonl or .ndjson file. Values inside objects get names such as `I040.RHO`. Raises InputError."""
-    text = encoding.as_utf8(name, content.read(name, path)).data.decode()
+    text, note = _without_cut_off(encoding.as_utf8(name, content.read(name, path)).data.decode())
     room.check(_HELD * (text.count("{") + text.count("[")) + _REFERENCE * text.count(","))
     columns = Sparse(room)
     try:
         found = _parsed(name, text)
         radar = asterix.document(found, lambda record: dict(flat(name, record, "", 0)), room)
         if radar is not None:
-            return radar
+            return radar.noting(note)
         for record in _records(found):
             columns.add(flat(name, record, "", 0))
     except RecursionError as error:
@@ -42,7 +42,16 @@ def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
         raise InputError(f"{name}: there are no rows; expected one JSON object for each reading.")
     if not columns.columns:
         raise InputError(f"{name}: it holds no objects with values; expected one object for each reading.")
-    return columns.header("JSON objects")
+    return columns.header("JSON objects").noting(note)
+
+
+def _without_cut_off(text: str) -> tuple[str, str]:
+    """The text without a last line that was cut off while it was written, below one that is whole; and a note on it."""
+    above, _, last = text.rpartition("\n")
+    whole = above.rpartition("\n")[2]
+    if not last.lstrip().startswith("{") or last.rstrip().endswith("}") or not whole.rstrip().endswith("}"):
+        return text, ""
+    return above, trimming.cut_off_note(last)
 
 
 def of_records(found: Any, form: str, room: limits.Room) -> TableHeader | None:

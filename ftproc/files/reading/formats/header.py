@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.files.limits import check_names
@@ -68,7 +68,12 @@ class TableHeader:
     @property
     def is_of_a_standard(self) -> bool:
         """Whether nothing is left to be asked about its columns but what `stated` says."""
-        return self.stated != _NOTHING
+        return self.stated._replace(notes=()) != _NOTHING
+
+    def noting(self, note: str) -> TableHeader:
+        """The same with one more note on what the file holds; itself without one."""
+        notes = (*self.stated.notes, note)
+        return replace(self, stated=self.stated._replace(notes=notes)) if note else self
 
     def __post_init__(self) -> None:
         check_names(self.source, self.names)

@@ -34,6 +34,9 @@ _FEW = 0.2  # of the lines, that may be words among the rows
 _LETTERS = np.arange(ord("a"), ord("z") + 1)
 _UNDER = 3  # lines under repeated names, at most, such as units and a rule
 _LAST = 4096  # bytes in which the last line is sought
+_ALIKE, _MOST_ALIKE = 1 << 16, 500  # bytes and lines before a cut line that show what its cells should be
+_NUMBER_MARKS = re.compile("[.,:eE]")
+_FEWEST, _MOST_FREE = 3, 20  # rows that show how many digits a cell should have, and where these differ
 
 
 def refuse_wide(source: str, head: bytes) -> None:
@@ -66,9 +69,9 @@ def without_comments_behind(data: bytes) -> tuple[bytes, str]:
 
 def rows_only(
     source: str, body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]
-) -> tuple[memoryview, str]:
-    """The rows without lines of text among and below them, and in words what was left out. Raises InputError where
-    other names stand among them."""
+) -> tuple[memoryview, str, str]:
+    """The rows without lines of text among and below them and without a last one that is cut off, in words what was
+    left out, and a note on the cut one. Raises InputError where other names stand among them."""
     whole, words = body.tobytes(), ""
     if _has_comments(whole):
         comments = [m.span() for m in _COMMENT.finditer(whole) if not _is_row(m[0], names, separator, widths)]
@@ -87,7 +90,52 @@ def rows_only(
         words += f", {zeros} zeros behind the rows"
     end, footer = _end(whole, names, separator, widths)
     words += f", {footer} lines below the table" if footer else ""
-    return memoryview(whole)[:end], words
+    rows = memoryview(whole)[:end]
+    cut, note = cut_off(rows, len(names), separator, widths)
+    return rows[: end - cut], words, note
+
+
+def cut_off(rows: bytes | memoryview, width: int, separator: str, widths: Sequence[int] = ()) -> tuple[int, str]:
+    """How many bytes at the end of rows of `width` cells are one that was cut off while it was written, and a note on
+    it: it has no end, and fewer cells than the rows above or fewer digits in its last cell than any of them."""
+    above, ended, line = bytes(rows[-_ALIKE:]).replace(b"\r", b"\n").rpartition(b"\n")
+    if not ended or not line.strip():
+        return 0, ""
+    texts = [each.decode("utf-8", "replace") for each in (line, *above.split(b"\n")[-_MOST_ALIKE:])]
+    cells, *others = (layout.split(text, separator, widths) for text in texts)
+    others = [each for each in others if len(each) == width]
+    others = [each for each in others if each[0] == cells[0]] or others
+    last = max((k for k, cell in enumerate(cells) if cell), default=0)
+    alike = [each[last] for each in others if layout.is_data(each[last : last + 1])]
+    begins_alike = others and (cells[0] == others[-1][0] or layout.is_data(cells[:1]))
+    if not (begins_alike and len(cells) < width) and not (alike and _is_shorter(cells[last], alike)):
+        return 0, ""
+    return len(line), cut_off_note(texts[0])
+
+
+def cut_off_note(line: str) -> str:
+    return f'the last line, "{line.strip()[:80]}", is cut off, so it is left out'
+
+
+def words_cut_off(text: bytes) -> tuple[int, str]:
+    """As `cut_off`, of lines of names and values."""
+    words = re.sub(rb"[^\r\n\w.+-]", b" ", text[-_ALIKE:])
+    before = re.search(rb"([^\r\n]+)[\r\n]+[^\r\n]+\Z", words)
+    gone, _ = cut_off(words, len(before[1].split()), layout.BLANKS) if before else (0, "")
+    return gone, cut_off_note(text[-gone:].decode("utf-8", "replace")) if gone else ""
+
+
+def _is_shorter(last: str, above: Sequence[str]) -> bool:
+    """Whether a number has fewer digits behind its last mark than any of those above it, or, without a mark, is much
+    shorter than the one above it."""
+    parts, *others = (re.split(_NUMBER_MARKS, cell) for cell in (last, *above))
+    digits = [len(each[-1]) for each in others]
+    if len(above) < (_MOST_FREE if min(digits) < max(digits) else _FEWEST):
+        return False
+    if min(map(len, others)) > 1:
+        return len(parts) < min(map(len, others)) or len(parts[-1]) < min(digits)
+    plain = last.isdecimal() and above[-1].isdecimal()
+    return plain and len(last) < min(map(len, above)) and 2 * int(last) < int(above[-1])
 
 
 def _without(whole: bytes, spans: Sequence[tuple[int, int]]) -> bytes:
