@@ -41,6 +41,8 @@ _LENGTHS = (
         Unit("cm", divide=1e2),
         Unit("mm", divide=1e3),
         Unit("dmi", 1828.8),
+        Unit("inch", 0.0254),
+        Unit("usft", 1200.0, 3937.0),  # of surveys in the United States
         Unit("cable", 185.2),  # a tenth of a nautical mile
         Unit("fathom", 1.8288),
     ),
@@ -80,165 +82,49 @@ UNITS: Mapping[str, Mapping[str, Unit]] = {
 
 #: Unit -> its other spellings, in small letters without blanks and points.
 SPELLINGS: Mapping[str, tuple[str, ...]] = {
-    "s": (
-        "sec",
-        "secs",
-        "second",
-        "seconds",
-        "epsec",
-        "seconde",
-        "secondes",
-        "segundo",
-        "segundos",
-        "secondi",
-        "sekunde",
-        "sekunden",
-        "sekunder",
-        "sekundy",
-        "saniye",
-        "sn",
-        "с",
-        "сек",
-        "секунды",
-        "秒",
-        "초",
-    ),
-    "ms": ("msec", "msecs", "millisec", "millisecond", "milliseconds", "мс", "毫秒"),
-    "us": ("usec", "usecs", "microsec", "microsecond", "microseconds", "μs", "μsec"),
-    "ns": ("nsec", "nsecs", "nanosec", "nanosecond", "nanoseconds"),
-    "min": (
-        *("mins", "minute", "minutes", "minuten", "minutos", "minuti", "minuty", "minuter", "minutter", "dakika"),
-        *("мин", "минута", "минуты", "минут", "хв", "分", "分钟", "분"),
-    ),
-    "h": ("hr", "hrs", "hour", "hours", "ч"),
-    "d": ("day", "days"),
-    "m": (
-        "meter",
-        "meters",
-        "metre",
-        "metres",
-        "mtr",
-        "mtrs",
-        "mètre",
-        "mètres",
-        "metros",
-        "metri",
-        "metrów",
-        "metrů",
-        "метр",
-        "метры",
-        "метров",
-        "м",
-        "米",
-        "公尺",
-        "メートル",
-        "미터",
-    ),
-    "km": (
-        "kms",
-        "kilometer",
-        "kilometers",
-        "kilometre",
-        "kilometres",
-        "kilomètres",
-        "kilómetros",
-        "chilometri",
-        "км",
-        "公里",
-        "千米",
-    ),
-    "ft": ("feet", "foot"),
-    "kft": ("kilofeet", "kfeet"),
-    "fl": ("flightlevel", "flightlevels"),
-    "kmh": ("kph",),
-    "kt": ("kts", "knot", "knots", "kn"),
-    "db": ("dbm", "dbw", "dbsm", "dbhz", "db-hz", "dbmv", "dbfs", "decibel", "decibels", "дб", "дбм", "分贝"),
-    "nmi": (
-        *(
-            "nauticalmile",
-            "nauticalmiles",
-            "nautmile",
-            "nautmiles",
-            "nautmi",
-            "nautical",
-            "mn",
-            "seemeile",
-            "seemeilen",
-        ),
-        *("millenautique", "millesnautiques", "millanáutica", "millasnáuticas", "migliomarino", "miglianautiche"),
-        *("sjömil", "sømil", "zeemijl", "zeemijlen", "морскаямиля", "морскиемили", "мормили", "海里"),
-    ),
-    "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
-    "yd": ("yds", "yard", "yards"),
-    "dmi": ("datamile", "datamiles"),  # of 6000 ft, of radars
-    "cable": (
-        *(
-            "cables",
-            "cbl",
-            "cbls",
-            "cablelength",
-            "cablelengths",
-            "kabellänge",
-            "kabellängen",
-            "encablure",
-            "encablures",
-        ),
-        *("каб", "кабельтов", "кабельтова", "кабельтовых", "кабельтовы", "链"),
-    ),
-    "fathom": ("fathoms", "fth", "fths", "ftm", "ftms", "faden"),
-    "kyd": ("kyds", "kyard", "kyards", "kiloyard", "kiloyards"),
-    "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
-    "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
-    "rad": ("rads", "radian", "radians", "рад", "弧度", "라디안"),
-    "deg": (
-        "degs",
-        "degree",
-        "degrees",
-        "°",
-        "dd",
-        "decimaldegrees",
-        "decdeg",
-        "град",
-        "гр",
-        "度",
-        "도",
-        "degré",
-        "degrés",
-        "degre",
-        "degres",
-        "grados",
-        "graus",
-        "gradi",
-        "graden",
-        "grader",
-        "stopni",
-        "stopnie",
-        "stopień",
-        "stupně",
-        "stupňů",
-        "derece",
-        "fok",
-        "astetta",
-        "градусы",
-        "градусов",
-        "градус",
-    ),
-    "mrad": ("mrads", "milliradian", "milliradians"),
-    "urad": ("urads", "μrad", "microrad", "microrads", "microradian", "microradians"),
-    "mdeg": ("millideg", "millidegree", "millidegrees"),
-    "cdeg": ("centideg", "centidegree", "centidegrees"),
-    "turn": ("turns", "rev", "revs", "revolution", "revolutions", "cycles"),
-    "bam16": ("bam", "bams"),
-    "mil": (
-        *("mils", "mil6400", "mils6400", "6400mil", "6400mils", "natomil", "natomils"),
-        *("strich", "artilleriestrich", "a‰", "‰", "₥", "millième", "millièmes", "milésimas", "millesimi"),
-    ),
-    "mil6300": ("mils6300", "6300mil", "6300mils", "streck"),
-    "mil6000": ("mils6000", "6000mil", "6000mils", "ду", "тыс", "tys", "tysięczne", "tysięcznych"),
-    "gon": ("gr", "gons", "grads", "grade", "grades", "gradian", "gradians"),
-    "mgon": ("milligon",),
-    "arcmin": ("arcmins", "arcminute", "arcminutes", "minofarc"),
-    "arcsec": ("arcsecs", "arcsecond", "arcseconds", "asec", "secofarc"),
+    name: tuple(words.split())
+    for name, words in {
+        "s": "sec secs second seconds epsec seconde secondes segundo segundos secondi sekunde sekunden sekunder "
+        "sekundy saniye sn с сек секунды 秒 초",
+        "ms": "мс 毫秒",
+        "min": "mins minute minutes minuten minutos minuti minuty minuter minutter dakika мин минута минуты минут хв "
+        "分 分钟 분",
+        "h": "hr hrs hour hours ч",
+        "d": "day days",
+        "m": "meter meters metre metres mtr mtrs mètre mètres metros metri metrów metrů метр метры метров м 米 公尺 "
+        "メートル 미터",
+        "km": "kms kilómetros chilometri км 公里 千米",
+        "ft": "feet foot",
+        "inch": "inches",
+        "usft": "ftus surveyft surveyfeet ussurveyft ussurveyfeet",
+        "kft": "kilofeet kfeet",
+        "fl": "flightlevel flightlevels",
+        "kmh": "kph",
+        "kt": "kts knot knots kn",
+        "db": "dbm dbw dbsm dbhz db-hz dbmv dbfs decibel decibels дб дбм 分贝",
+        "nmi": "nauticalmile nauticalmiles nautmile nautmiles nautmi nautical mn seemeile seemeilen millenautique "
+        "millesnautiques millanáutica millasnáuticas migliomarino miglianautiche sjömil sømil zeemijl "
+        "zeemijlen морскаямиля морскиемили мормили 海里",
+        "mi": "mile miles smi sm statutemile statutemiles",
+        "yd": "yds yard yards",
+        "dmi": "datamile datamiles",
+        "cable": "cables cbl cbls cablelength cablelengths kabellänge kabellängen encablure encablures каб кабельтов "
+        "кабельтова кабельтовых кабельтовы 链",
+        "fathom": "fathoms fth fths ftm ftms faden",
+        "kyd": "kyds kyard kyards kiloyard kiloyards",
+        "rad": "rads radian radians рад 弧度 라디안",
+        "deg": "degs degree degrees ° dd decimaldegrees decdeg град гр 度 도 degré degrés degre degres grados graus "
+        "gradi graden grader stopni stopnie stopień stupně stupňů derece fok astetta градусы градусов градус",
+        "turn": "turns rev revs revolution revolutions cycles",
+        "bam16": "bam bams",
+        "mil": "mils mil6400 mils6400 6400mil 6400mils natomil natomils strich artilleriestrich a‰ ‰ ₥ millième "
+        "millièmes milésimas millesimi",
+        "mil6300": "mils6300 6300mil 6300mils streck",
+        "mil6000": "mils6000 6000mil 6000mils ду тыс tys tysięczne tysięcznych",
+        "gon": "gr gons grads grade grades gradian gradians",
+        "arcmin": "arcmins arcminute arcminutes minofarc",
+        "arcsec": "arcsecs arcsecond arcseconds asec secofarc",
+    }.items()
 }
 _BY_SPELLING = {word: name for name, words in SPELLINGS.items() for word in words}
 #: A length over a time: m/s, m s^-1, km_h, meters_per_second; without anything between them where both are short.
@@ -247,7 +133,27 @@ _OVER_TIME = re.compile(
 )
 _OF_SPEEDS = {"s": 1.0, "h": 3600.0}
 
-
+_PREFIXES = {
+    "kilo": 3,
+    "k": 3,
+    "hecto": 2,
+    "h": 2,
+    "deca": 1,
+    "deka": 1,
+    "da": 1,
+    "deci": -1,
+    "d": -1,
+    "centi": -2,
+    "c": -2,
+    "milli": -3,
+    "m": -3,
+    "micro": -6,
+    "u": -6,
+    "μ": -6,
+    "nano": -9,
+    "n": -9,
+}
+_WITH_PREFIXES = ("m", "s", "rad", "deg", "gon", "grad", "turn", "arcsec")
 _NUMBER = r"(?:\d{1,9}(?:\.\d{0,20})?|\.\d{1,20})(?:e[+-]?\d{1,2})?"
 _FACTOR = re.compile(
     rf"(?:[x×*·]\s*)?(?:10(?:\^|\*\*)\(?(?P<power>[+-]?\d{{1,2}})\)?|(?P<of>{_NUMBER})(?:\s*/\s*(?P<by>{_NUMBER}))?)"
@@ -264,10 +170,21 @@ def unit_named(quantity: str, word: str) -> Unit | None:
 
 def _plainly_named(quantity: str, word: str) -> Unit | None:
     plain = word.lower().replace(" ", "").replace(".", "").replace("_", "").replace("º", "°").replace("µ", "μ")
-    if word.strip() == "Mm":  # megametres
+    if word.strip() in ("Mm", "Dm", "DM"):  # megametres; data miles or decimetres
         return None
     known = UNITS[quantity].get(plain) or UNITS[quantity].get(_BY_SPELLING.get(plain, ""))
-    return known or (_speed_named(plain) if quantity == "range_rate" else None)
+    return known or (_speed_named(plain) if quantity == "range_rate" else _prefixed(quantity, plain))
+
+
+def _prefixed(quantity: str, plain: str) -> Unit | None:
+    """A part or a multiple by tens of a metre, a second or an angle: dam, hectometres, ddeg, cgon."""
+    for prefix, power in _PREFIXES.items():
+        word = plain.removeprefix(prefix)
+        base = UNITS[quantity].get(_BY_SPELLING.get(word, word)) if word != plain else None
+        if base is not None and base.name in _WITH_PREFIXES and (power < 0 or base.name == "m"):  # hdeg: hundredths
+            found = Unit(plain, base.multiply * 10.0 ** max(power, 0), base.divide * 10.0 ** max(-power, 0))
+            return next((unit for unit in UNITS[quantity].values() if unit[1:] == found[1:]), found)
+    return None
 
 
 def _speed_named(plain: str) -> Unit | None:

@@ -77,6 +77,36 @@ def test_a_factor_before_a_unit_counts(quantity: str, word: str, one: float) -> 
     assert unit_named(quantity, unit.name) == unit
 
 
+@pytest.mark.parametrize(
+    ("quantity", "word", "one"),
+    [
+        ("time", "cs", 1e-2),
+        ("time", "deciseconds", 0.1),
+        ("range", "dam", 10.0),
+        ("range", "hm", 100.0),
+        ("range", "dm", 0.1),
+        ("range", "Kilometre", 1000.0),
+        ("range", "um", 1e-6),
+        ("range", "us survey ft", 1200 / 3937),
+        ("azimuth", "ddeg", math.pi / 1800),
+        ("azimuth", "cgon", math.pi / 20_000),
+        ("azimuth", "μrad", 1e-6),
+        ("azimuth", "millirev", 2e-3 * math.pi),
+        ("range_rate", "dm/s", 0.1),
+    ],
+)
+def test_prefixes_of_tens_count(quantity: str, word: str, one: float) -> None:
+    unit = unit_named(quantity, word)
+    assert unit is not None
+    assert unit.to_si(np.array([1.0]))[0] == pytest.approx(one, rel=1e-14)
+    assert unit_named(quantity, unit.name) == unit
+
+
+def test_prefixes_that_mean_several_things_are_no_units() -> None:
+    for quantity, word in (("azimuth", "hdeg"), ("range", "DM"), ("range", "Dm"), ("range", "Mm"), ("time", "hs")):
+        assert unit_named(quantity, word) is None
+
+
 def test_what_is_no_plain_factor_is_no_unit() -> None:
     for word in ("0 m", "1/0 m", "x m", "1000's of ft", "5", "1e999 m", "Mm"):
         assert unit_named("range", word) is None

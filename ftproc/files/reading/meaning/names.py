@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import unicodedata
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from ftproc.files.limits import LONGEST_NAME
@@ -12,8 +13,10 @@ from ftproc.files.units import unit_named
 from ftproc.files.words import (
     ALIASES,
     EITHER_ANGLE,
+    NOT_UNITS,
     OF_TIMES,
     ONLY_BY_UNIT,
+    OTHER_THINGS,
     QUALIFIERS,
     QUANTITIES,
     TRUE,
@@ -58,7 +61,7 @@ _FOREIGN = frozenset(
     [
         *("m/s", "mps", "km/h", "kmh", "kph", "kt", "kts", "kn", "knots", "ft/s", "fps", "deg/s", "dps", "rad/s"),
         *("mrad/s", "hz", "khz", "mhz", "ghz", "db", "dbm", "v", "mv", "w", "k", "c", "degc", "°c", "degf", "hpa"),
-        *("mbar", "pa"),
+        *("mbar", "pa", "ohm", "ohms", "ω", "ma", "amp", "amps"),
         *("%", "counts", "count", "raw", "m/s2", "m/s^2", "g", "ppm", "fl", "fpm", "ft/min", "nm/h", "rpm", "°/s"),
     ]
 )
@@ -188,6 +191,26 @@ def taken_apart(text: str, unit: str = "") -> Name:
             found = found or ("" if foreign else inside)
     stem, words = _words(plain)
     return Name(text, stem, words, found, notation, foreign)
+
+
+def units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) -> Iterator[tuple[int, str]]:
+    """Column and unit, where a name of the quantity has a unit that is none of its units."""
+    weak = {alias for alias in WEAK_ALIASES[quantity] if len(alias) > 2}.difference(ONLY_BY_UNIT)
+    for index in free:
+        name = apart[index]
+        if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()} or name.means(quantity):
+            continue
+        if quantity == "elevation" and unit_named("height", name.unit):
+            continue
+        long = len(name.stem) > 1 or any(unit_named(quantity, word) for word in name.unit.split())
+        if name.unit and ((name.stem in ALIASES[quantity] and long) or name.stem in weak):
+            yield index, name.unit
+        elif not name.unit and len(name.words) > 1 and name.words[-1].isalpha():
+            before, last = name._replace(words=name.words[:-1]).core(), name.words[-1]
+            if before in weak.union(ALIASES[quantity]) and last not in OTHER_THINGS.union(
+                QUALIFIERS, *ALIASES.values()
+            ):
+                yield index, last
 
 
 def compatible(text: str) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning.bearings import counts_from, says_north
-from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.reading.meaning.names import Name, taken_apart, units_unknown
 from ftproc.files.units import LIGHT_MPS, UNITS, unit_named
 from ftproc.files.words import (
     ALIASES,
@@ -18,7 +18,6 @@ from ftproc.files.words import (
     EITHER_ANGLE,
     FURTHER_ALIASES,
     NOT_UNITS,
-    ONLY_BY_UNIT,
     OTHER_THINGS,
     QUANTITIES,
     SPEEDS,
@@ -126,7 +125,7 @@ def refuse_unknown_unit(source: str, apart: Sequence[Name], free: Sequence[int],
     """A log without a range may be angles-only; one with `range_furlong` is not."""
     names = [name.text for name in apart]
     absent = "" if quantity == "time" else f", or --columns {quantity}={ABSENT} if it is something else"
-    for index, unit in _units_unknown(apart, free, quantity):
+    for index, unit in units_unknown(apart, free, quantity):
         raise InputError(
             f'{source}: "{unit}" in column "{names[index]}" is not a unit of {quantity}; understood are '
             f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
@@ -237,24 +236,6 @@ def refuse_either(source: str, apart: Sequence[Name], free: Sequence[int]) -> No
             f"order that the names leave open. Say {one} or {other}; add --elevation-from zenith if the other angle "
             "counts from the vertical."
         )
-
-
-def _units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) -> Iterator[tuple[int, str]]:
-    """Column and unit, where a name of the quantity has a unit that is none of its units."""
-    for index in free:
-        name = apart[index]
-        if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
-            continue
-        known = any(unit_named(quantity, word) for word in name.unit.split())
-        if quantity == "elevation" and unit_named("height", name.unit):  # a height
-            continue
-        weak = name.stem in WEAK_ALIASES[quantity] and len(name.stem) > 2 and name.stem not in ONLY_BY_UNIT
-        if name.unit and ((name.stem in ALIASES[quantity] and (len(name.stem) > 1 or known)) or weak):
-            yield index, name.unit
-        elif not name.unit and len(name.words) == 2:
-            first, last = name.words
-            if len(first) > 1 and first in ALIASES[quantity] and last not in ALIASES[quantity]:
-                yield index, last
 
 
 def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[int, ...]], propose: Propose) -> None:

@@ -205,9 +205,7 @@ def _named(table: _Table, quantity: str, name: str) -> Column:
     if len(indices) == 1:
         if not name.isdecimal():
             questions.refuse_twice(table.source, table.names, name)
-        text, unit = table.apart[indices[0]].text, table.apart[indices[0]].unit
-        known = any(unit_named(quantity, word) for word in unit.split())
-        if unit and not known and quantity not in table.units and text.endswith((")", "]")):
+        if quantity not in table.units:
             questions.refuse_unknown_unit(table.source, table.apart, indices, quantity)
         return table.column(quantity, indices[0], "--columns")
     roles = parts.together(quantity, [table.apart[index] for index in indices])
