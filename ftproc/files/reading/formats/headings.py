@@ -16,10 +16,18 @@ def joined_brackets(line: str) -> list[str]:
     return [str(cell) for cell in cells]
 
 
+def closed_by_brackets(line: str) -> list[str]:
+    """The words of a line up to each bracket, `Slant Range (m) Az (deg)`, if these are names."""
+    cells = [cell.strip() for cell in re.findall(r"[^()\[\]]{1,200}[(\[][^()\[\]]{0,200}[)\]]", line)]
+    names = [taken_apart(cell) for cell in cells]
+    whole = line.rstrip().endswith((")", "]"))
+    return cells if whole and all(name.foreign or any(map(name.means, QUANTITIES)) for name in names) else []
+
+
 def aligned(line: str, block: Sequence[str], width: int) -> list[str]:
-    """The words of a line by the column of numbers that each stands above."""
+    """The words of a line by the column of numbers that each stands above, unless these hide names in others."""
     found = above_columns(line, block, width)
-    return found if found and all(found) else []
+    return found if found and all(found) and known(found) >= known(line.split()) else []
 
 
 def stacked(over: Sequence[str], block: Sequence[str], width: int) -> list[str] | None:
@@ -55,7 +63,7 @@ def above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
     if not centres:
         return []
     cells: list[list[str]] = [[] for _ in range(width)]
-    for word in re.finditer(r"\S+", line):
+    for word in re.finditer(r"[^\s(\[]+ ?[(\[][^)\]]{0,200}[)\]]|\S+", line):
         behind = bisect.bisect(centres, centre := (word.start() + word.end()) / 2)
         beside = range(max(behind - 1, 0), min(behind + 1, width))
         cells[min(beside, key=lambda k: abs(centres[k] - centre))].append(word[0])

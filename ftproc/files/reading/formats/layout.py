@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ftproc.files.reading.formats import headings
 from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import taken_apart
-from ftproc.files.reading.meaning.preamble import are_units, enumerated, units_stated
+from ftproc.files.reading.meaning.preamble import are_units, enumerated, spread, units_stated
 from ftproc.files.words import QUANTITIES
 
 #: How comment lines begin. A semicolon does so too, where it is not the separator.
@@ -41,7 +41,6 @@ RULE = re.compile(r"(?=[+*#|,;:\s]*+(?:[-=_][+*#|,;:\s]++)*+[-=_]{2})[-=_+*#|,;:
 _UNNAMED = {
     "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
     "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
-    "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
 }
 #: What may stand behind the last name and in no row: a separator, or a name of comments, as LabVIEW writes them.
 _LAST_OF_NAMES = ("", "comment", "comments", "remark", "remarks", "note", "notes")
@@ -167,7 +166,11 @@ def _with_names(
     index = _above_comments(over, index, lambda line: _heading(line, separator, width, block, widths))
     if index >= 0:
         cells = _heading(lines[filled[index]], separator, width, block, widths)
-        if cells is not None and are_units(cells) and index:
+        if cells is None and index and are_units(few := split(lines[filled[index]], separator, widths)):
+            named = _heading(lines[filled[index - 1]], separator, width, block, widths) or []
+            stack = headings.stacked([lines[number] for number in filled[max(index - 2, 0) : index + 1]], block, width)
+            cells = spread(few, named) if headings.known(named) > headings.known(stack or []) else []
+        if cells and are_units(cells) and index:
             units, index = cells, index - 1
     names = None if index < 0 else _heading(lines[filled[index]], separator, width, block, widths)
     groups = (
@@ -220,7 +223,8 @@ def _mismatched(line: str, separator: str) -> list[str]:
 
 
 def _heading(line: str, separator: str, width: int, block: Sequence[str], widths: Sequence[int]) -> list[str] | None:
-    """The cells of a line above the rows if there are as many as in a row; it may begin as comments do."""
+    """The cells of a line above the rows if there are as many as in a row; it may begin as comments do. Cells that are
+    apart in another way than those of the rows count if they are names; of several ways the one with the most names."""
     bare = line
     mark = next((mark for mark in (*COMMENTS, ";") if line.lstrip().startswith(mark) and mark != separator), "")
     if mark and not widths:
@@ -229,30 +233,52 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
     if mark:
         bare = _CALLED.sub("", bare)
     ways = [split(bare, separator, widths)]
-    if separator == BLANKS:
-        ways += [
-            re.split(r"\s{2,}|\t", bare.strip()),
-            headings.joined_brackets(bare),
-            headings.aligned(bare, block, width),
-        ]
-        ways += [[cell.strip() for cell in bare.split(mark)] for mark in (",", ";", "|") if mark in bare]
-        first = next((name for name, pattern in _UNNAMED.items() if _begin_with(block, pattern)), "")
-        ways += [[first, *way] for way in (bare.split(), headings.joined_brackets(bare)) if first]
-    elif separator == "\t":
+    if separator in (BLANKS, "\t"):
         ways += [bare.split(), headings.joined_brackets(bare)]
-    for cells in ways:
-        if len(cells) == width:
-            return cells
-        if len(cells) == width + 1 and cells[-1].lower() in _LAST_OF_NAMES:
-            return cells[:-1]
-        if len(cells) == width - 1 and separator != BLANKS and all(row.rstrip().endswith(separator) for row in block):
-            return [*cells, ""]
-    return None
+    if separator == BLANKS:
+        ways.append(headings.aligned(bare, block, width))
+    others = [] if widths else [split(bare, mark) for mark in _SEPARATORS if mark != separator and mark in bare]
+    groups = re.split(r"\s{2,}|\t", bare.strip())
+    others += [] if widths else [headings.closed_by_brackets(bare)]
+    ways = [way for way in ways if len(groups) < 2 or headings.known(way) >= headings.known(groups)]
+    (ways if separator == BLANKS else others).append(groups)
+    rows = [split(row, separator, widths) for row in block]
+    found = [_of_width(way, rows, block if separator == BLANKS else ()) for way in ways]
+    more = [_of_width(way, rows, ()) for way in others]
+    found += [names for names in more if names and (headings.known(names) > 1 or are_units(names))]
+    return max(filter(None, found), key=headings.known, default=None)
+
+
+def _of_width(names: list[str], rows: Sequence[Sequence[str]], block: Sequence[str]) -> list[str] | None:
+    """As many names as there are cells in each row; empty ones where all cells are, and for what stands without a name
+    before the others."""
+    width, empty = len(rows[0]), [not any(column) for column in zip(*rows, strict=False)]
+    spare = width - len(names)
+    if spare == 0:
+        return names
+    if spare == -1 and names[-1].lower() in _LAST_OF_NAMES:
+        return names[:-1]
+    if spare > 0 and all(empty[-spare:]):
+        return [*names, *[""] * spare]
+    if spare > 0 and all(empty[:spare]):
+        return [*[""] * spare, *names]
+    first = next((name for name, pattern in _UNNAMED.items() if block and _begin_with(block, pattern)), "")
+    if spare == 1 and not first and headings.known(names) > 1 and _are_numbered(rows, names):
+        first = "row"
+    return [first, *names] if spare == 1 and first else None
 
 
 def _begin_with(block: Sequence[str], pattern: str) -> bool:
-    """Whether all rows begin so; a number that the pattern catches goes on by one."""
-    found = [match for row in block if (match := re.match(pattern, row))]
-    numbers = [int(match[1]) for match in found if match.groups()]
-    steps = (later - before for before, later in itertools.pairwise(numbers))
-    return len(found) == len(block) and all(step == 1 for step in steps)
+    """Whether all rows begin so."""
+    return all(re.match(pattern, row) for row in block)
+
+
+def _are_numbered(rows: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
+    """Whether the first cells count the rows, and are not themselves the time that the first name may be that of."""
+    first, second = ([cells[k].strip('" ') for cells in rows] for k in (0, 1))
+    if not all(cell.isdecimal() for cell in first) or {int(b) - int(a) for a, b in itertools.pairwise(first)} != {1}:
+        return False
+    numbers = [float(cell) for cell in second if re.fullmatch(r"\d+(?:\.\d+)?", cell)]
+    steps = [later - before for before, later in itertools.pairwise(numbers)]
+    evenly = bool(steps) and 0 < max(steps) < 1.001 * min(steps) + 1e-6
+    return not taken_apart(names[0]).means("time") or evenly or not numbers

@@ -26,6 +26,7 @@ _IN = re.compile(  # ranges in feet; az, el in 0.01 deg
     re.IGNORECASE,
 )
 _SEVERAL = 2  # names with units in brackets in one line, which needs no word for units
+_MOST_SPREAD = 12  # columns over a row of fewer units
 _MOST_LINES, _LONGEST = 200, 300  # that are searched: above the table, and characters of one
 #: Words for several columns -> their quantities.
 _GROUPED: Mapping[str, Sequence[str]] = {
@@ -97,6 +98,18 @@ def are_units(cells: Sequence[str]) -> bool:
     known = sum(any(unit_named(quantity, word) is not None for quantity in QUANTITIES) for word in present)
     brackets = sum(bool(re.fullmatch(r"[(\[].*[)\]]", cell)) for cell in cells)
     return bool(present) and 2 * max(known, brackets) >= len(present)
+
+
+def spread(units: Sequence[str], names: Sequence[str]) -> list[str]:
+    """A row of fewer units than columns: each by the column whose unit it must be, with their order kept; "" where they
+    leave it open; nothing where they fit in no way."""
+    apart, words = [taken_apart(name) for name in names[:_MOST_SPREAD]], [unit.strip("()[]{} ") for unit in units]
+    meant = [[quantity for quantity in QUANTITIES if name.means(quantity)] for name in apart]
+    fits = [[not mine or any(unit_named(q, word) for q in mine) for mine in meant] for word in words]
+    chosen = itertools.combinations(range(len(names)), len(words)) if len(apart) == len(names) else ()
+    ways = [dict(zip(ks, units, strict=True)) for ks in chosen if all(fit[k] for fit, k in zip(fits, ks, strict=True))]
+    each = ({way.get(k, "") for way in ways} for k in range(len(names)))
+    return [mine.pop() if len(mine) == 1 else "" for mine in each] if ways else []
 
 
 def ruled(lines: Sequence[str], first: int) -> list[int]:
