@@ -251,6 +251,16 @@ OTHER_THINGS = frozenset(
 ).union(*(added for _, _, added in TURNED.values()))
 
 
+#: Words of columns that count frames, samples or rows.
+FRAMES = frozenset(
+    _split(
+        """
+    frame frames sample samples index idx n no nr num number id count counter seq sequence row point record scan image
+    picture bild pulse cycle sweep video camera
+    """
+    )
+)
+
 #: Words of a column that holds the readings of another after a correction, or the correction itself.
 CORRECTED = frozenset(_split("corr corrected calibrated cal compensated comp refined adjusted"))
 

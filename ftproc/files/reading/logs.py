@@ -88,13 +88,13 @@ def read(
     header = statements.with_units_beside(header)
     statements.refuse_unheard(header, station, unit_of)
     column_of = {**header.stated.columns, **column_of}
-    if header.stated.azimuth_from and station.azimuth_from is None:
-        station = replace(station, azimuth_from=header.stated.azimuth_from)
-    parted = carried.columns(header, column_of)
-    column_of = {**parted, **column_of}
+    station = replace(station, azimuth_from=station.azimuth_from or header.stated.azimuth_from or None)
+    column_of = {**(parted := carried.columns(header, column_of)), **column_of}
     propose = proposal.by_values(header)
     if "time" not in column_of and not schema.has_time(header.names, header.units):
         index = proposal.the_moments(header, range(len(header.names)))
+        if index is None and "time" not in unit_of and (frames := statements.by_frames(header)):
+            header, index, unit_of["time"] = frames
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     found |= {quantity: found[quantity]._replace(why=carried.WHY) for quantity in parted}

@@ -16,6 +16,7 @@ from ftproc.files.words import (
     ALIASES,
     COURSES,
     EITHER_ANGLE,
+    FRAMES,
     FURTHER_ALIASES,
     NOT_UNITS,
     OTHER_THINGS,
@@ -142,6 +143,23 @@ def refuse_hours(source: str, name: Name, quantity: str) -> None:
             "Convert it to degrees (15 to the hour) and rename it; "
             f"if it is in degrees, minutes and seconds, say --units {quantity}=deg."
         )
+
+
+def counts_frames(name: Name) -> bool:
+    """Whether a column counts frames or samples: `Frame No.`, `sample_25Hz`."""
+    words = [word for word in name.words if not re.fullmatch(r"\d+(?:fps|hz)", word)]
+    return bool(words) and FRAMES.issuperset(words) and not name.unit
+
+
+def refuse_frames(source: str, names: Sequence[str], index: int, units: Sequence[str] = ()) -> None:
+    """Ask how many frames or samples there are in a second. units: of the time, as several lines state them."""
+    say = answer(names, {"time": index})
+    ways = " or ".join(f"{say} --units {quoted(f'time={unit}')}" for unit in units)
+    raise InputError(
+        f'{source}: "{names[index]}" counts frames or samples, and '
+        f"{'several rates are stated' if units else 'nothing says how many there are in a second'}. Say "
+        f"{ways or f'{say} --units time=UNIT, where UNIT is such as {chr(39)}1/25 s{chr(39)} for 25 in a second'}."
+    )
 
 
 def refuse_course(source: str, apart: Sequence[Name], roles: Mapping[str, int]) -> None:

@@ -207,6 +207,8 @@ def _named(table: _Table, quantity: str, name: str) -> Column:
             questions.refuse_twice(table.source, table.names, name)
         if quantity not in table.units:
             questions.refuse_unknown_unit(table.source, table.apart, indices, quantity)
+            if quantity == "time" and not name.isdecimal() and questions.counts_frames(table.apart[indices[0]]):
+                questions.refuse_frames(table.source, table.names, indices[0])
         return table.column(quantity, indices[0], "--columns")
     roles = parts.together(quantity, [table.apart[index] for index in indices])
     if roles is None:

@@ -14,7 +14,7 @@ from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import as_text, parsed
 from ftproc.files.reading.meaning.preamble import GROUPS
-from ftproc.files.reading.meaning.questions import answer
+from ftproc.files.reading.meaning.questions import answer, counts_frames, refuse_frames
 from ftproc.files.units import unit_named
 from ftproc.files.words import ALIASES, QUANTITIES
 from ftproc.settings import Station
@@ -39,6 +39,56 @@ _MANY = re.compile(
 )
 _ONE = re.compile(r"(?<![\w.])(?P<worth>\.?\d[\d.eE/^*+-]*\s*(?:[^\W\d]\w*|°))(?!\s*[=:])")
 _LONGEST_LINE = 300  # characters
+
+
+_NUMBER = r"(\d{1,7}(?:[.,]\d{1,9})?)"
+_SAMPLED = r"(?:frame|sampl\w*|update|data|output|logging|recording|measurement|acquisition|scan|image|abtast|bild)"
+#: How many frames there are in a second, or what one takes.
+_RATES = tuple(
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        rf"{_NUMBER}\s*(?:fps\b|(?:frame|sample|point|record|reading|image|scan)s?\s*(?:/|per|a)\s*s(?:ec(?:ond)?)?\b)",
+        rf"(?:\bfs|\brate|{_SAMPLED}[\s_-]*(?:rate|frequency|frequenz)?)[^\d\n]{{0,5}}{_NUMBER}\s*hz\b",
+        rf"(?:\bfps|\bfs|{_SAMPLED}[\s_-]*(?:rate|frequency|frequenz))\s*[:=,;]\s*{_NUMBER}\s*$",
+    )
+)
+_INTERVAL = re.compile(
+    rf"(?:\bdt|delta[\s_]?t|Δt|\bts|(?:{_SAMPLED}|time)[\s_-]*(?:interval\w*|period|step|spacing)|\bevery)"
+    rf"\s*(?:[:=,;]|is|of)?\s*{_NUMBER}\s*([^\W\d]*)\s*(?:$|[,;)])",
+    re.IGNORECASE,
+)
+
+
+def by_frames(header: TableHeader) -> tuple[TableHeader, int, str] | None:
+    """The header with a note on the time that a column of frames or samples tells, that column, and its unit by the
+    rate that its name or a line above the table states; None of other tables. Raises InputError for several rates."""
+    apart = [taken_apart(name) for name in header.names]
+    counting = [k for k, name in enumerate(apart) if counts_frames(name) and _goes_on(header, k)]
+    readings = any(name.means(quantity) for name in apart for quantity in QUANTITIES[1:])
+    if not readings or not counting:
+        return None
+    index = next((k for k in counting if {"frame", "frames", "sample", "samples"} & {*apart[k].words}), counting[0])
+    lines = (*(line for line in header.above if len(line) <= _LONGEST_LINE), header.names[index])
+    stated = {unit: line.strip() for line in lines for unit in _frames_of(line)}
+    if not stated:
+        return None
+    if len(stated) > 1:
+        refuse_frames(header.source, header.names, index, [*stated])
+    ((unit, line),) = stated.items()
+    return header.noting(f'"{header.names[index]}" is the time in steps of {unit}, by "{line[:80]}"'), index, unit
+
+
+def _frames_of(line: str) -> list[str]:
+    """What a frame takes by a line, such as 1/25 s."""
+    rates = [f"1/{found[1].replace(',', '.')} s" for pattern in _RATES for found in pattern.finditer(line)]
+    steps = [f"{found[1].replace(',', '.')} {found[2] or 's'}" for found in _INTERVAL.finditer(line)]
+    return [unit for unit in dict.fromkeys(rates + steps) if unit_named("time", unit)]
+
+
+def _goes_on(header: TableHeader, index: int) -> bool:
+    """Whether a column holds whole numbers that grow from row to row."""
+    values = parsed(as_text(header.load([], [index]).column(0)), header.decimal_comma)
+    return values is not None and len(values) > 1 and bool((np.diff(values) >= 1).all() and not (values % 1).any())
 
 
 def with_units_beside(header: TableHeader) -> TableHeader:
