@@ -25,7 +25,8 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         unixtime posix posixtime timesinceepoch secondssinceepoch juliandate julianday
         modifiedjuliandate datenum stamp zulu utcsec irigtime sampletime timetag clock
         timeepoch epochtime zeitpunkt systime itow utcsod utctod utcseconds timestamputc unixtimestamp excel
-        exceldate exceltime missiontime ts met
+        exceldate exceltime excelserial excelserialdate excelserialday exceldatenumber serialdate serialdatenumber
+        oledate gpssow missiontime ts met
         missionelapsedtime gmt gmttime localtime timecode smpte ltc vitc hms hhmmss hhmmssmmm ticks filetime
         secondsaftermidnight
         secondspastmidnight secondssincemidnight secspastmidnight secpastmidnight secsaftermidnight

@@ -93,8 +93,8 @@ def read(
     propose = proposal.by_values(header)
     if "time" not in column_of and not schema.has_time(header.names, header.units):
         index = proposal.the_moments(header, range(len(header.names)))
-        if index is None and "time" not in unit_of and (frames := statements.by_frames(header)):
-            header, index, unit_of["time"] = frames
+        if index is None and "time" not in unit_of and (counts := statements.by_counts(header)):
+            header, index, unit_of["time"] = counts
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     found |= {quantity: found[quantity]._replace(why=carried.WHY) for quantity in parted}

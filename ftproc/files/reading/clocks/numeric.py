@@ -28,8 +28,9 @@ _STEMS = {
     **dict.fromkeys(("mjd", "modifiedjuliandate"), "mjd"),
     **dict.fromkeys(("jd", "juliandate", "julianday"), "jd"),
     "datenum": "datenum",
-    **dict.fromkeys(("excel", "exceldate", "exceltime"), "excel"),
-    **dict.fromkeys(("tow", "sow", "timeofweek", "secondsofweek", "gpstow", "gpstimeofweek", "itow"), "week"),
+    **dict.fromkeys(("excel", "exceldate", "exceltime", "excelserial", "excelserialdate", "excelserialday",
+                     "exceldatenumber", "serialdate", "serialdatenumber", "oledate"), "excel"),
+    **dict.fromkeys(("gpssow", "tow", "sow", "timeofweek", "secondsofweek", "gpstow", "gpstimeofweek", "itow"), "week"),
     **dict.fromkeys(("gps", "gpstime", "timegps", "gpsseconds", "gpst"), "gps"),
     **dict.fromkeys(("unix", "unixtime", "posix", "posixtime", "epoch", "epochtime"), "unix"),
     **dict.fromkeys(("timestamp", "unixtimestamp"), "unix"),
@@ -53,6 +54,7 @@ _DIGITS = re.compile(r"hms|hhmmss(?:m*|s*|f*)")  # names of such numbers
 _CALENDAR = (1.97e13, 2.1e13)  # yyyymmddhhmmss
 _BEHIND = (1e3, 1e2, 1e1, 1e6)  # digits of the second behind hhmmss, without a point
 _SAMPLE = 2000  # times by which the size and the step are judged
+_MOST_OF_A_YEAR = 367.0  # days, and their fraction
 _LARGEST = 1e300  # two larger numbers would overflow in a mean
 _MOST_DAYS_STEP = 5e-4  # in s it would be a rate of 2 kHz, in days it is 43 s
 
@@ -72,6 +74,8 @@ def read(values: FloatArray, column: Column, source: str = "") -> Clock:
         return _in_seconds(column.unit.to_si(values), kind, column, f"numbers in {column.unit.name}")
     size, most = _typical(known), float(known.max())
     counted = _day_count(kind, size, known)
+    if counted == "jd" and known.min() >= 1 and most < _MOST_OF_A_YEAR:
+        return Clock(values * DAY_S, "", "days of the year, which are called Julian, in s since its day 0")
     if counted:
         return _of_days(values, Origin(source, column.name, "a time"), *_DAY_COUNTS[counted])
     counted_from = next((entry for entry in _TICKS if entry[0] <= size < entry[1]), None)

@@ -51,10 +51,10 @@ _CLOCK_FACE = re.compile(
     r"(?:yy|yyyy|mm|dd|ddd|doy)*(?:hh?mm?s{1,2}|hhmms{2}[sfm]+|hours?min(?:utes)?sec(?:onds)?)(?:dd|mm|yy|yyyy)*"
     r"|min(?:utes)?sec(?:onds)?|mmss[sf]*"
 )
-_TIMES = ("time", "timestamp", "stamp", "t")
 _SECONDS, _COUNTED_FROM = ("seconds", "secs", "sec"), frozenset(("of", "since", "after", "from"))
-_OF_UTC = ("utc", "gmt")  # behind the name of a time
+_TIMES, _OF_UTC = ("time", "timestamp", "stamp", "t"), ("utc", "gmt")  # and what may stand behind them
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
+_DAYS = re.compile(r".*[\s_.([-](mjd|jd|doy|excel)[)\]]?", re.IGNORECASE)  # the count of days at the end of a name
 
 #: Units of other quantities, by which a column is known for something else.
 _FOREIGN = frozenset(
@@ -68,9 +68,8 @@ _FOREIGN = frozenset(
 #: Words in brackets that are notations of a time or an angle.
 NOTATIONS = frozenset(
     [
-        *("utc", "utcg", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"),
-        *("degmin", "degminsec"),
-        *("t", "true"),  # from true north
+        *("utc", "utcg", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai", "ut"),
+        *("degmin", "degminsec", "t", "true"),  # from true north
     ]
 )
 
@@ -155,6 +154,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     plain = EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
     if _is_a_clock(plain):
         return Name(text, _squeezed(plain), (_squeezed(plain),))
+    plain = _DAYS.sub(r"\1", plain)
     found, notation, foreign = "", "", False
     opening = plain.rfind(_OPENING[_CLOSING.index(plain[-1])]) if plain.endswith(_CLOSING) else -1
     if opening >= 0:

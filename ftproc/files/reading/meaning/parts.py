@@ -169,6 +169,12 @@ def _spellings(name: Name) -> set[str]:
     return {name.stem, core, name.stem + name.unit.lower(), core + name.unit.lower()} - {""}
 
 
+def is_day_of_year(name: Name) -> bool:
+    """Whether it names a day of the year, perhaps with a word that says it has a fraction."""
+    bare = "".join(word for word in name.words if word not in ("decimal", "dec", "fractional", "frac", "utc"))
+    return bool({name.stem, bare} & {*_TIME["doy"]}) and not name.foreign
+
+
 def unit_of_day(name: Name) -> str | None:
     """The unit of a time of day beside a date, such as `Msec of day` or `UT (h)`, "" where its name states none; None
     of other names."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from ftproc.errors import InputError, quoted
 from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import as_text, parsed
 from ftproc.files.reading.meaning.preamble import GROUPS
@@ -59,10 +60,16 @@ _INTERVAL = re.compile(
 )
 
 
-def by_frames(header: TableHeader) -> tuple[TableHeader, int, str] | None:
-    """The header with a note on the time that a column of frames or samples tells, that column, and its unit by the
-    rate that its name or a line above the table states; None of other tables. Raises InputError for several rates."""
+def by_counts(header: TableHeader) -> tuple[TableHeader, int, str] | None:
+    """The header, the column whose name says that it counts days of the year or parts of a day, and its unit; or, with
+    a note, one of frames or samples, by the rate that its name or a line above the table states. None of other tables.
+    Raises InputError for several rates."""
     apart = [taken_apart(name) for name in header.names]
+    of_days = {k: "d" for k, name in enumerate(apart) if parts.is_day_of_year(name) and _goes_on(header, k, 0.0)}
+    of_day = {k: unit or "d" for k, name in enumerate(apart) if (unit := parts.unit_of_day(name)) is not None}
+    for counted in (of_days, {k: unit for k, unit in of_day.items() if _goes_on(header, k, 0.0)}):
+        if len(counted) == 1:
+            return header, *counted.popitem()
     counting = [k for k, name in enumerate(apart) if counts_frames(name) and _goes_on(header, k)]
     readings = any(name.means(quantity) for name in apart for quantity in QUANTITIES[1:])
     if not readings or not counting:
@@ -85,10 +92,11 @@ def _frames_of(line: str) -> list[str]:
     return [unit for unit in dict.fromkeys(rates + steps) if unit_named("time", unit)]
 
 
-def _goes_on(header: TableHeader, index: int) -> bool:
-    """Whether a column holds whole numbers that grow from row to row."""
+def _goes_on(header: TableHeader, index: int, whole: float = 1.0) -> bool:
+    """Whether a column holds numbers that grow from row to row, and whole ones unless `whole` is zero."""
     values = parsed(as_text(header.load([], [index]).column(0)), header.decimal_comma)
-    return values is not None and len(values) > 1 and bool((np.diff(values) >= 1).all() and not (values % 1).any())
+    grow = values is not None and len(values) > 1 and bool((np.diff(values) > 0).all())
+    return grow and values is not None and not (whole and (values % whole).any())
 
 
 def with_units_beside(header: TableHeader) -> TableHeader:
