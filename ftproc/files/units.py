@@ -120,7 +120,7 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
         "mil": "mils mil6400 mils6400 6400mil 6400mils natomil natomils strich artilleriestrich a‰ ‰ ₥ millième "
         "millièmes milésimas millesimi",
         "mil6300": "mils6300 6300mil 6300mils streck",
-        "mil6000": "mils6000 6000mil 6000mils ду тыс tys tysięczne tysięcznych",
+        "mil6000": "mils6000 6000mil 6000mils ду тд тыс tys tysięczne tysięcznych",
         "gon": "gr gons grads grade grades gradian gradians",
         "arcmin": "arcmins arcminute arcminutes minofarc",
         "arcsec": "arcsecs arcsecond arcseconds asec secofarc",

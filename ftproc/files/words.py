@@ -31,7 +31,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         secondsaftermidnight
         secondspastmidnight secondssincemidnight secspastmidnight secpastmidnight secsaftermidnight
         timepastmidnight timeaftermidnight timesincemidnight utcofposition timez zulutime
-        zeit uhrzeit temps heure heuretu heureutc heuretuc instant tiempo
+        zeit uhrzeit horodatage temps heure heuretu heureutc heuretuc instant tiempo
         hora horautc tempo ora orautc czas czasutc tid tidspunkt tijd tijdstip aika ido cas zaman saat время времяutc
         час 时间 時間 時刻 时刻 시간 시각
         """
@@ -110,20 +110,20 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": ("date", "gpst", "daytime"),
     "range": _split(
         """
-        dist sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odleglosc
+        dist dst rdst sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odleglosc
         abstand avstand afstand mesafe vzdalenost tavolsag etaisyys расстояние д d 距离 距離 거리
         """
     ),
     "azimuth": _split(
         """
-        theta hz hr richtung horizontalwinkel horizontalrichtung horizontalangle horizontaldirection hzangle hangle ha
-        horangle horizangle horizontalvinkel anglehorizontal angulohorizontal angoloorizzontale kathorizontalny аз β
+        theta rdir hz hr richtung horizontalwinkel horizontalrichtung horizontalangle horizontaldirection hzangle hangle
+        ha horangle horizangle horizontalvinkel anglehorizontal angulohorizontal angoloorizzontale kathorizontalny аз β
         """
     ),
     "elevation": _split(
         """
-        v h vertikalwinkel verticalangle vertangle vangle va elv alt altitude site sito situ depression depressionangle
-        ум ε
+        v h ele vertikalwinkel verticalangle vertangle vangle va elv alt altitude site sito situ depression
+        depressionangle ум ε
         """
     ),
 }
@@ -136,13 +136,13 @@ OF_TIMES = frozenset(
     log logged record recorded recording rec recv received receive rx reception acquisition acq capture captured
     measurement measured meas sample sampled sampling observation obs event frame packet message msg data
     since from after of start begin launch liftoff takeoff release boot power on origin epoch zero t0 rel relative
-    elapsed mission test run day week midnight sec secs second seconds
+    elapsed decimal mission test run day week midnight sec secs second seconds
     """
     )
 )
 
 #: Weak aliases that need a unit, because alone they are a height, a place or anything.
-ONLY_BY_UNIT = ("alt", "altitude", "site", "sito", "situ", "d", "д", "h", "hr", "z", "vz", "β", "ε")
+ONLY_BY_UNIT = ("alt", "ele", "altitude", "site", "sito", "situ", "d", "д", "h", "hr", "z", "vz", "β", "ε")
 
 #: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
 EITHER_ANGLE = ("theta", "phi", "psi", "alpha", "θ", "φ", "ψ", "α", "beta", "β", "pan", "tilt")

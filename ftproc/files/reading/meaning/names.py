@@ -66,10 +66,11 @@ _FOREIGN = frozenset(
     ]
 )
 #: Words in brackets that are notations of a time or an angle.
+_OF_CLOCKS = ("utc", "gps", "gpst", "gmt", "ut", "z", "zulu")
 NOTATIONS = frozenset(
     [
-        *("utc", "utcg", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai", "ut"),
-        *("degmin", "degminsec", "t", "true"),  # from true north
+        *(*_OF_CLOCKS, "utcg", "tai", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "degmin", "degminsec"),
+        *("t", "true"),  # from true north
     ]
 )
 
@@ -159,8 +160,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     opening = plain.rfind(_OPENING[_CLOSING.index(plain[-1])]) if plain.endswith(_CLOSING) else -1
     if opening >= 0:
         before, inside = plain[:opening].rstrip(_BEFORE), plain[opening + 1 : -1].strip()
-        known = _unit_inside(inside)
-        squeezed = _squeezed(inside)
+        known, squeezed = _unit_inside(inside), _squeezed(inside)
         if known:
             plain, found = before, known
         elif frames := _OF_FRAMES.fullmatch(inside):
@@ -269,7 +269,7 @@ def _suffix(text: str) -> tuple[str, str, bool]:
             return _without_in(longer[1]), pair, False
         if _is_unit(found[2]):
             return _without_in(found[1]), found[2], False
-    if found and found[2].lower() in NOTATIONS and found[2].lower() not in ("utc", "gps", "gpst", "z", "zulu"):
+    if found and found[2].lower() in NOTATIONS.difference(_OF_CLOCKS):
         return found[1], found[2].lower(), False
     for k in range(max(1, len(text) - _LONGEST_UNIT), len(text)):  # 斜距km
         if text[k - 1] > _EASTERN and _is_unit(text[k:]) and _is_name(text[:k]):

@@ -222,16 +222,17 @@ def refuse_alike(
 
 def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str) -> None:
     """Ask for the scale of readings that are counts of an encoder, or times of flight."""
-    name, names = apart[index], [each.text for each in apart]
+    name, names, unit = apart[index], [each.text for each in apart], unit_named("time", apart[index].unit)
     words = {name.stem, *name.words, *re.findall(r"[^\W\d_]+", name.text.lower())}
     if quantity == "range" and words & _HORIZONTAL:
         raise InputError(
             f'{source}: column "{name.text}" is a horizontal distance, and ranges are slant ones. Divide it by the '
             f"cosine of the elevation and name it a slant range, or say --columns range={ABSENT} to leave it out."
         )
-    if quantity == "range" and words & _FLIGHTS:
-        unit = unit_named("time", name.unit)
-        scale = f"'range={LIGHT_MPS / 2 * (unit.multiply / unit.divide if unit else 1.0):.9g} m'"
+    if quantity == "range" and (words & _FLIGHTS or (unit and words & {*ALIASES["range"]})):
+        once = LIGHT_MPS * (unit.multiply / unit.divide if unit else 1.0)
+        there_and_back = f"'range={once / 2:.9g} m' (there and back; one way it is {once:.9g} m)"
+        scale = f"'range={once:.9g} m'" if {"one", "oneway"} & words else there_and_back
         what = f"times of flight{'' if unit else ' in a unit that its name does not state'}"
     elif quantity != "range" and words & _COUNTS and words & {each for each in ALIASES[quantity] if len(each) > 1}:
         scale, what = f"'{quantity}=1/65536 turn' (16 bits) or '{quantity}=1/131072 turn' (17)", "counts of an encoder"
