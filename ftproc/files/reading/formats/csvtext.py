@@ -216,7 +216,7 @@ class CsvText(NamedTuple):
         elif self.delimiter == BLANKS:
             hint = "Complete the row, or name the widths of the columns in characters, such as --widths 10,12,10,10."
         else:
-            hint = "Complete the row or delete it." if row else "Complete the row, or the names in the header."
+            hint = "Complete the row or delete it."
         cell = "cell" if len(cells) == 1 else "cells"
         return f"{self.source}: {row_named(row)} has {len(cells)} {cell} where the header has {expected}. {hint}"
 

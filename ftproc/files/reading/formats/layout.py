@@ -35,6 +35,7 @@ _WITH_BLANKS = re.compile(
     r"|\d\S*\s?[A-Za-z°%/]+"
     r')\s*"?'
 )
+_LONGEST_HEADING = 20_000  # characters of a line that is taken apart in several ways
 _LONGEST_CELL = 200  # characters of a number or a time
 RULE = re.compile(r"(?=[+*#|,;:\s]*+(?:[-=_][+*#|,;:\s]++)*+[-=_]{2})[-=_+*#|,;:\s]*+")
 #: Columns without a name above them: the name that they get -> how the rows begin.
@@ -233,6 +234,8 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
     if mark:
         bare = _CALLED.sub("", bare)
     ways = [split(bare, separator, widths)]
+    if len(bare) > _LONGEST_HEADING:
+        return ways[0] if len(ways[0]) == width else None
     if separator in (BLANKS, "\t"):
         ways += [bare.split(), headings.joined_brackets(bare)]
     if separator == BLANKS:

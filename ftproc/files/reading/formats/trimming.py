@@ -120,8 +120,8 @@ def cut_off_note(line: str) -> str:
 def words_cut_off(text: bytes) -> tuple[int, str]:
     """As `cut_off`, of lines of names and values."""
     words = re.sub(rb"[^\r\n\w.+-]", b" ", text[-_ALIKE:])
-    before = re.search(rb"([^\r\n]+)[\r\n]+[^\r\n]+\Z", words)
-    gone, _ = cut_off(words, len(before[1].split()), layout.BLANKS) if before else (0, "")
+    _, _, before = words.replace(b"\r", b"\n").rpartition(b"\n")[0].rstrip(b"\n").rpartition(b"\n")
+    gone, _ = cut_off(words, len(before.split()), layout.BLANKS) if before.strip() else (0, "")
     return gone, cut_off_note(text[-gone:].decode("utf-8", "replace")) if gone else ""
 
 
