@@ -28,6 +28,7 @@ FEWEST = 16  # samples before a track may be confirmed,
 GROWTH = 1.25  # and times as many at the next attempt
 OLD = 64  # samples, after which rows leave before all of the window is edited, as it seldom tells much of them
 NEARLY_S = 1e-6  # by which times may be rounded
+HASTE = 3.0  # times the work of a turn, where a track may be lost
 STALE = 4  # times what a window keeps, after which an edit of all of it that is still under way is given up
 
 
@@ -45,7 +46,7 @@ class LiveEditor:
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
         self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is edited,
-        self.urgent = False  # at once
+        self.urgent = False  # as soon as may be
         self.refreshed = 0  # rows that the last refresh has seen
         self.held = Waiting.nothing()  # rows that are taken when there is something to do
         self.put_off = False  # whether there may be something to do before the next row is taken
@@ -240,7 +241,7 @@ class LiveEditor:
         """A turn at the edit of all of the window, or the whole of it."""
         self.next_work = self.count + self.pace.turn
         try:
-            window.go_on(math.inf if self.urgent else self.pace.work)
+            window.go_on(HASTE * self.pace.work if self.urgent else self.pace.work)
         except ValueError:  # a component has too few readings that agree
             window.refresh()
         if window.under_way is None:
