@@ -102,6 +102,9 @@ def _angles() -> Iterator[Kind]:
         yield Kind(f"{name}, unsaid", BARE, lambda f, u=turn: [f.t, f.r, _deg(f.a, u), _deg(f.e, u)], told)
     for name, turn in (("rad", 2 * np.pi), ("gon", 400), ("mil", 6400)):
         yield Kind(f"{name} named deg", DEG, lambda f, u=turn: [f.t, f.r, _deg(f.a, u), _deg(f.e, u)])
+    yield Kind("arcmin named deg", DEG, lambda f: [f.t, f.r, _deg(f.a, 21600), _deg(f.e, 21600)])
+    yield Kind("mrad named rad", RAD, lambda f: [f.t, f.r, f.a * 1e3, f.e * 1e3])
+    yield Kind("elevations from the nadir", DEG, lambda f: [f.t, f.r, _deg(f.a), 90 + _deg(f.e)], unknowable=True)
     yield Kind("deg named rad", RAD, lambda f: [f.t, f.r, _deg(f.a), _deg(f.e)])
     yield Kind("gon named deg in words", "time,range (m),Azimuth (deg),Elevation (deg)",
                lambda f: [f.t, f.r, _deg(f.a, 400), _deg(f.e, 400)])  # fmt: skip

@@ -22,7 +22,14 @@ from tests.files.conftest import Make, refused
             "Say --units azimuth=mil or --units azimuth=mrad or --units azimuth=mil6000.",
         ),
         ("t,el_deg\n0,800\n", "lies beyond 800 deg, which is no elevation. Say --columns elevation=el_deg --units"),
-        ("t,el_deg\n0,95\n", "lies beyond 95 deg, which is no elevation. Say --elevation-from zenith"),
+        (
+            "t,el_deg\n0,95\n",
+            "no elevation. Say --elevation-from zenith if the target is below the station, or take 90 degrees off",
+        ),
+        (
+            "t,az_rad,el_rad\n0,1500,100\n",
+            "or --columns azimuth=az_rad,elevation=el_rad --units azimuth=mrad,elevation=mrad or",
+        ),
         (
             "t,A\n0,1e9\n",
             "is no azimuth in any unit that is known. Say --columns azimuth=A --units azimuth=UNIT.",

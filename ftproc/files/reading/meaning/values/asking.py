@@ -44,6 +44,8 @@ def contradicted(
         raise plunged
     *first, last = [*_answers(log, ways), *([] if named_so else [""])]
     names_are = f", or {last} if the names are right" if named_so else ""
+    if first == ["--elevation-from zenith"] and not named_so:  # so half of them are beyond the horizon
+        names_are = " if the target is below the station, or take 90 degrees off angles that count from the nadir"
     why = _impossible(log, sizes) or (
         f"what the names say of {_differing_words(log, ways)} gives the target no likely motion, and another way does"
     )
@@ -94,9 +96,10 @@ def _in_mils(way: Way) -> bool:
 
 def _differing(log: Known, ways: Sequence[Way]) -> tuple[list[str], bool, bool]:
     """The quantities whose units differ among ways, whether the zenith does, and whether the angles are exchanged."""
-    units = [q for k, q in enumerate(QUANTITIES) if len({_unit(way, k) for way in ways}) > 1]
-    if len(ways) == 1:  # all other ways are impossible
-        units = [q for q in QUANTITIES if q in log.found and ways[0].units[QUANTITIES.index(q)] != log.found[q].unit]
+    named = {q: c.unit.name for q, c in log.found.items() if len(ways) == 1 or not log.is_open(q)}
+    units = [
+        q for k, q in enumerate(QUANTITIES) if len({_unit(way, k) for way in ways} | {*[named.get(q)]} - {None}) > 1
+    ]
     zenith = len({way.zenith for way in ways} | {log.is_zenith}) > 1
     return units, zenith, len({way.exchanged for way in ways} | {False}) > 1
 

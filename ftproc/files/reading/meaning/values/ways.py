@@ -28,9 +28,9 @@ _SURVEYORS_GRAD = 0.03
 _OTHER = {
     "time": (3e-4, ("s", "ms", "us")),
     "range": (3e-4, ("m", "km", "mm")),
-    "angle": (0.02, ("rad", "deg", "grad", "mil")),
+    "angle": (0.02, ("rad", "deg", "grad", "mil", "mrad", "arcmin")),
 }
-_OTHER_MIL = 0.08  # times as likely as the other angles
+_SELDOM, _SELDOM_MEANT = ("mil", "mrad", "arcmin"), 0.08  # times as likely as the other angles
 _NEVER = 1e-9  # but where a name is impossible
 _CANONICAL = 0.3  # times as likely in a column of the program's own name
 _MIXED, _ONE_WRONG = 0.03, 0.2  # two angles in two units, where no name states one, and where names do
@@ -111,7 +111,7 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
         prior *= _CANONICAL if kind != "angle" else _NEVER
     for name in others:
         if name != column.unit.name and not (name == "grad" and column.unit.name == "gon"):
-            yield UNITS[quantity][name], prior * (_OTHER_MIL if name == "mil" else 1.0)
+            yield UNITS[quantity][name], prior * (_SELDOM_MEANT if name in _SELDOM else 1.0)
 
 
 def _is_sure(column: Column) -> bool:
@@ -157,7 +157,8 @@ def _of_both(log: Known, azimuth: tuple[Unit | None, float], elevation: tuple[Un
         return max(prior_a, prior_e) if alike else min(prior_a, prior_e) * _MIXED
     if log.found["azimuth"].unit.name != log.found["elevation"].unit.name:
         return prior_a * prior_e
-    return min(prior_a, prior_e) * (1.0 if alike else _ONE_WRONG)
+    one_wrong = log.found["azimuth"].unit.name in (a.name, e.name)
+    return min(prior_a, prior_e) * (1.0 if alike else _ONE_WRONG if one_wrong else _MIXED)
 
 
 def _fit(
