@@ -111,7 +111,7 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "range": _split(
         """
         dist dst rdst sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odleglosc
-        abstand avstand afstand mesafe vzdalenost tavolsag etaisyys расстояние д d 距离 距離 거리
+        strecke abstand avstand afstand mesafe vzdalenost tavolsag etaisyys расстояние д d 距离 距離 거리
         """
     ),
     "azimuth": _split(

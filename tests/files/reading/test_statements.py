@@ -50,6 +50,8 @@ def test_a_line_above_the_table_is_heard(log: Log, line: str, sentence: str, oth
     ("head", "sentence"),
     [
         ("Time (s),HD (m),Az (deg),El (deg)", '"HD (m)" is a horizontal distance, and ranges are slant ones'),
+        ("Time (s),Range gate,Az (deg),El (deg)", '"Range gate" may be the range as numbers of range gates'),
+        ("Time (s),Bin,Az (deg),El (deg)", "--columns range=Bin --units range=UNIT, where UNIT is the length of one"),
         ("Time (s),D,Az (deg),El (deg)", 'column "D" may be the range. Say --columns range=D'),
         ("Time (s),Slant (Dm),Az (deg),El (deg)", '"Dm" in column "Slant (Dm)" is not a unit of range'),
         ("Time (s),latitude,longitude,elevation", "positions by latitude and longitude, not readings"),
@@ -121,3 +123,17 @@ def test_the_worth_of_a_count_above_the_table_is_asked_about(make: Make, line: s
 def test_other_lines_with_counts_and_scales_say_nothing(make: Make, line: str) -> None:
     rows = "".join(f"{k / 2},{50000 + 7 * k},{20 + k / 8},{10 + k / 16}\n" for k in range(30))
     assert len(logs.read(make(f"# {line}\ntime,range,az_deg,el_deg\n{rows}"), units="range=m")) == 30
+
+
+@pytest.mark.parametrize("name", ["time_to_go_s", "t_to_impact", "T-minus", "Time remaining (s)", "Countdown"])
+def test_a_time_that_counts_down_is_refused(log: Log, name: str) -> None:
+    falling = "".join(f"{80 - k},{9000 + 40 * k},{30 + 0.1 * k},{10 + 0.02 * k}\n" for k in range(60))
+    head = f"{name},range_m,azimuth_deg,elevation_deg"
+    with pytest.raises(InputError, match=r"counts down to an event, and a time counts up\. Write minus its numbers"):
+        logs.read(log(head, falling))
+    with pytest.raises(InputError, match=r"no time column|is not a unit of time"):
+        logs.read(log(head, ROWS))
+
+
+def test_a_strecke_is_a_range(log: Log) -> None:
+    assert logs.read(log("Zeit,Strecke,Richtung,Vertikalwinkel")).measurement[0, 0] == 9000

@@ -27,6 +27,7 @@ from ftproc.files.words import (
 
 _COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
 _FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
+_GATES = re.compile(r"(?:range)?(?:gate|bin|cell)s?(?:no|nr|num|number|index)?")  # whole stems
 _HORIZONTAL = frozenset(("hd", "horizontaldistance", "horizontalrange", "groundrange", "grounddistance", "hdist"))
 _BESIDE_V = {"range": "s", "azimuth": "h"}  # the slope distance and the horizontal angle of surveyors
 _MOST_WORDS = 6  # of a name that may number its target
@@ -197,7 +198,6 @@ def refuse_alike(
     has a name that this one may have too, so any column with a name that is not known may be it."""
     known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
     surveyors = any(each.stem == "v" and index not in free for index, each in enumerate(apart))
-    other = NOT_UNITS - _OF_THE_QUANTITY
     for index in free if quantity != "time" else ():
         name = apart[index]
         words = {name.stem, *name.words}
@@ -210,7 +210,7 @@ def refuse_alike(
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
         bare = (quantity == "range" and name.stem == "d") or (surveyors and name.stem == _BESIDE_V.get(quantity))
         unknown = doubtful and not another and not any(name.stem in stems for stems in FURTHER_ALIASES.values())
-        if not name.foreign and (either or bare or ((alike or unknown) and not other & words)):
+        if not name.foreign and (either or bare or ((alike or unknown) and not NOT_UNITS - _OF_THE_QUANTITY & words)):
             say = answer([each.text for each in apart], {quantity: index})
             turns = counts_from(name) if quantity == "azimuth" else ""
             only = f" if {turns}, from which it counts, stays where it is" if turns else ""
@@ -221,7 +221,7 @@ def refuse_alike(
 
 
 def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str) -> None:
-    """Ask for the scale of readings that are counts of an encoder, or times of flight."""
+    """Ask for the scale of readings that are counts of an encoder, numbers of range gates, or times of flight."""
     name, names, unit = apart[index], [each.text for each in apart], unit_named("time", apart[index].unit)
     words = {name.stem, *name.words, *re.findall(r"[^\W\d_]+", name.text.lower())}
     if quantity == "range" and words & _HORIZONTAL:
@@ -236,6 +236,8 @@ def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str)
         what = f"times of flight{'' if unit else ' in a unit that its name does not state'}"
     elif quantity != "range" and words & _COUNTS and words & {each for each in ALIASES[quantity] if len(each) > 1}:
         scale, what = f"'{quantity}=1/65536 turn' (16 bits) or '{quantity}=1/131072 turn' (17)", "counts of an encoder"
+    elif quantity == "range" and _GATES.fullmatch(name.stem) and not name.unit:
+        scale, what = "range=UNIT, where UNIT is the length of one, such as '15 m'", "numbers of range gates"
     else:
         return
     raise InputError(
@@ -275,18 +277,16 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
     proposed = propose(free, found)
     seen = f" Its columns hold, in two rows: {proposed.seen}." if proposed.seen else ""
     none = f"--columns {','.join(f'{quantity}=NAME' for quantity in sought)}"
-    say = f"{proposed.answer or none}{', which gives a target that moves like one' * (len(sought) > 1)}" \
-        if proposed.answer else none  # fmt: skip
+    moves = ", which gives a target that moves like one" * (len(sought) > 1)
+    say = f"{proposed.answer}{moves}" if proposed.answer else none
     if names and list(names) == [str(number) for number in range(1, len(names) + 1)]:
-        none_moves = (
-            "" if proposed.answer or not seen else " No choice of them gives a target that clearly moves like one."
-        )
+        no_answer = bool(seen and not proposed.answer)
+        none_moves = " No choice of them gives a target that clearly moves like one." * no_answer
         raise InputError(
             f"{source}: there is no line of column names.{seen}{none_moves} Say which column is which by their "
             f"numbers, such as {say}."
         )
-    others = [names[index] for index in free if not NOT_UNITS & {*taken_apart(names[index]).words}]
-    hint = nearest(CANONICAL[wanted], others)
+    hint = nearest(CANONICAL[wanted], [names[k] for k in free if not NOT_UNITS & {*taken_apart(names[k]).words}])
     similar = next((index for index in free if hint and f'"{names[index]}"' in hint), None)
     say = say if proposed.answer or similar is None else answer(names, {wanted: similar})
     raise InputError(

@@ -39,6 +39,9 @@ _MANY = re.compile(
     re.IGNORECASE,
 )
 _ONE = re.compile(r"(?<![\w.])(?P<worth>\.?\d[\d.eE/^*+-]*\s*(?:[^\W\d]\w*|°))(?!\s*[=:])")
+_COUNTDOWN = re.compile(
+    r"(?:t|time)(?:to|till|until|before)\w+|(?:t|time)(?:minus|remaining|left)|countdown|remainingtime|tgo|ttg"
+)
 _LONGEST_LINE = 300  # characters
 
 
@@ -63,7 +66,7 @@ _INTERVAL = re.compile(
 def by_counts(header: TableHeader) -> tuple[TableHeader, int, str] | None:
     """The header, the column whose name says that it counts days of the year or parts of a day, and its unit; or, with
     a note, one of frames or samples, by the rate that its name or a line above the table states. None of other tables.
-    Raises InputError for several rates."""
+    Raises InputError for several rates, and for a time that counts down."""
     apart = [taken_apart(name) for name in header.names]
     of_days = {k: "d" for k, name in enumerate(apart) if parts.is_day_of_year(name) and _goes_on(header, k, 0.0)}
     of_day = {k: unit or "d" for k, name in enumerate(apart) if (unit := parts.unit_of_day(name)) is not None}
@@ -72,6 +75,8 @@ def by_counts(header: TableHeader) -> tuple[TableHeader, int, str] | None:
             return header, *counted.popitem()
     counting = [k for k, name in enumerate(apart) if counts_frames(name) and _goes_on(header, k)]
     readings = any(name.means(quantity) for name in apart for quantity in QUANTITIES[1:])
+    if readings:
+        _refuse_countdown(header)
     if not readings or not counting:
         return None
     index = next((k for k in counting if {"frame", "frames", "sample", "samples"} & {*apart[k].words}), counting[0])
@@ -85,6 +90,15 @@ def by_counts(header: TableHeader) -> tuple[TableHeader, int, str] | None:
     return header.noting(f'"{header.names[index]}" is the time in steps of {unit}, by "{line[:80]}"'), index, unit
 
 
+def _refuse_countdown(header: TableHeader) -> None:
+    for k, name in enumerate(header.names):
+        if _COUNTDOWN.fullmatch(taken_apart(name).stem) and _goes_on(header, k, 0.0, -1.0):
+            raise InputError(
+                f'{header.source}: column "{name}" counts down to an event, and a time counts up. Write minus its '
+                "numbers (10 s before the event are -10) and name it time_s."
+            )
+
+
 def _frames_of(line: str) -> list[str]:
     """What a frame takes by a line, such as 1/25 s."""
     rates = [f"1/{found[1].replace(',', '.')} s" for pattern in _RATES for found in pattern.finditer(line)]
@@ -92,10 +106,11 @@ def _frames_of(line: str) -> list[str]:
     return [unit for unit in dict.fromkeys(rates + steps) if unit_named("time", unit)]
 
 
-def _goes_on(header: TableHeader, index: int, whole: float = 1.0) -> bool:
-    """Whether a column holds numbers that grow from row to row, and whole ones unless `whole` is zero."""
+def _goes_on(header: TableHeader, index: int, whole: float = 1.0, sign: float = 1.0) -> bool:
+    """Whether a column holds numbers that grow from row to row, or fall for sign -1, and whole ones unless `whole` is
+    zero."""
     values = parsed(as_text(header.load([], [index]).column(0)), header.decimal_comma)
-    grow = values is not None and len(values) > 1 and bool((np.diff(values) > 0).all())
+    grow = values is not None and len(values) > 1 and bool((sign * np.diff(values) > 0).all())
     return grow and values is not None and not (whole and (values % whole).any())
 
 
