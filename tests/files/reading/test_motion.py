@@ -117,3 +117,15 @@ def test_degrees_are_offered_before_mils(tmp_path: Path) -> None:
         read(tmp_path / "a.csv", "time_s,range_m,az,el", time, distance, azimuth, elevation)
     said = str(question.value)
     assert 0 < said.index("=deg") < said.index("=mil")
+
+
+def test_an_elevation_that_passes_a_whole_turn_is_an_azimuth(tmp_path: Path) -> None:
+    """Of a drone that weaves about north, whose motion does not tell; a target is not so far below the horizontal."""
+    time = np.arange(400) / 5
+    x, y, z = -150 + 5 * time + 10 * np.sin(time / 9), 60 + 25 * np.sin(time / 17), 12 + 18 * np.sin(time / 25) ** 2
+    rng = np.random.default_rng(4)
+    azimuth = (np.degrees(np.arctan2(x, y)) + rng.normal(0, 3e-3, 400)) % 360
+    elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + rng.normal(0, 3e-3, 400)
+    distance = np.sqrt(x**2 + y**2 + z**2) + rng.normal(0, 0.01, 400)
+    with pytest.raises(InputError, match="or --columns azimuth=el_deg,elevation=az_deg --elevation-from horizon"):
+        read(tmp_path / "a.csv", "time_s,range_m,az_deg,el_deg", time, distance, elevation, azimuth)

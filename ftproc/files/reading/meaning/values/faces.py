@@ -16,7 +16,7 @@ from ftproc.settings import Station
 
 _FEWEST_IN_RUNS = 3  # cells
 _NEAR_RAD = math.radians(20)  # to the zenith: readings on both sides of it
-_LEAST_OF_A_TURN_RAD = math.radians(270)
+_LEAST_OF_A_TURN_RAD = math.radians(315)  # 45 degrees below the horizon
 _FROM_RAD, _TO_RAD = math.radians(190), math.radians(350)  # 80 degrees above the horizon in both faces
 
 
