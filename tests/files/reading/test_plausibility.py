@@ -28,7 +28,7 @@ from tests.files.conftest import Make, refused
         ),
         (
             "t,az_rad,el_rad\n0,1500,100\n",
-            "or --columns azimuth=az_rad,elevation=el_rad --units azimuth=mrad,elevation=mrad or",
+            "or --columns azimuth=az_rad,elevation=el_rad --units azimuth=mrad,elevation=mrad.",
         ),
         (
             "t,A\n0,1e9\n",

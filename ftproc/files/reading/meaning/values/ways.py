@@ -28,9 +28,10 @@ _SURVEYORS_GRAD = 0.03
 _OTHER = {
     "time": (3e-4, ("s", "ms", "us")),
     "range": (3e-4, ("m", "km", "mm")),
-    "angle": (0.02, ("rad", "deg", "grad", "mil", "mrad", "arcmin")),
+    "angle": (0.02, ("rad", "deg", "grad", "mil")),
 }
-_SELDOM, _SELDOM_MEANT = ("mil", "mrad", "arcmin"), 0.08  # times as likely as the other angles
+_SELDOM = 0.08  # times as likely as the other angles are mils, and parts of the unit that is stated
+_PARTS = {"rad": ("mrad",), "deg": ("arcmin",)}
 _NEVER = 1e-9  # but where a name is impossible
 _CANONICAL = 0.3  # times as likely in a column of the program's own name
 _MIXED, _ONE_WRONG = 0.03, 0.2  # two angles in two units, where no name states one, and where names do
@@ -109,9 +110,10 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
     prior, others = _OTHER[kind]
     if is_canonical(column):
         prior *= _CANONICAL if kind != "angle" else _NEVER
-    for name in others:
+    parts = _PARTS.get(column.unit.name, ()) if kind == "angle" else ()
+    for name in (*others, *parts):
         if name != column.unit.name and not (name == "grad" and column.unit.name == "gon"):
-            yield UNITS[quantity][name], prior * (_SELDOM_MEANT if name in _SELDOM else 1.0)
+            yield UNITS[quantity][name], prior * (_SELDOM if name in ("mil", *parts) else 1.0)
 
 
 def _is_sure(column: Column) -> bool:
