@@ -154,6 +154,7 @@ _PREFIXES = {
     "n": -9,
 }
 _WITH_PREFIXES = ("m", "s", "rad", "deg", "gon", "grad", "turn", "arcsec")
+_LONGEST_SPELT = 80  # characters, factor and blanks included
 _NUMBER = r"(?:\d{1,9}(?:\.\d{0,20})?|\.\d{1,20})(?:e[+-]?\d{1,2})?"
 _FACTOR = re.compile(
     rf"(?:[x×*·]\s*)?(?:10(?:\^|\*\*)\(?(?P<power>[+-]?\d{{1,2}})\)?|(?P<of>{_NUMBER})(?:\s*/\s*(?P<by>{_NUMBER}))?)"
@@ -165,6 +166,8 @@ _FACTOR = re.compile(
 def unit_named(quantity: str, word: str) -> Unit | None:
     """The unit of `quantity` that is written so, in any case, such as `km` or `Kilometres`, perhaps behind a factor:
     `100 ns`, `x1000 ft`, `1/128 s`, `10^-3 deg`. None if none."""
+    if len(word) > _LONGEST_SPELT:
+        return None
     return _plainly_named(quantity, word) or _scaled(quantity, word.strip())
 
 

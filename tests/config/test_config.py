@@ -194,11 +194,11 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("site = 3", '"site" is a section: write [site], and its keys below it.'),
         ("[range]\nbias_ell = 1", '[range] "bias_ell" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, '
          'bias_nm, bias_mi, bias_yd, bias_kyd, bias_kft, bias_cm, bias_mm, bias_dmi, '
-         'bias_cable, bias_fathom; '
+         'bias_inch, bias_usft, bias_cable, bias_fathom; '
          'did you mean "bias_m"?'),
         ("[range]\nbias = 1", '[range] "bias" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, '
          'bias_nm, bias_mi, bias_yd, bias_kyd, bias_kft, bias_cm, bias_mm, bias_dmi, '
-         'bias_cable, bias_fathom; did '
+         'bias_inch, bias_usft, bias_cable, bias_fathom; did '
          'you mean "bias_m"?'),
         ("[range]\nbias_m = 1\nbias_ft = 3", "[range] has bias in two units; leave one out."),
         ("[site]\nlat_deg = 98\nlon_deg = 1\nheight_m = 1", "[site] lat_deg = 98: expected a number from -90 to 90."),

@@ -253,7 +253,7 @@ def _apart(quantity: str, text: str, unit: str) -> Name:
 
 
 #: Before a word, and before a capital letter within one: range_rate|_m_s, range|Rate|Kt.
-_WHERE_UNITS_BEGIN = re.compile(r"(?:^|[\W_]+|(?<=[^\W\d_A-Z])(?=[A-Z]))(?=[^\W\d]|\d[^_]*$)")
+_WHERE_UNITS_BEGIN = re.compile(r"(?:^|(?<![\W_])[\W_]++|(?<=[^\W\d_A-Z])(?=[A-Z]))(?=[^\W\d]|\d[^_]*$)")
 
 
 def _means(quantity: str, name: Name) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -52,9 +53,10 @@ _CLOCK_FACE = re.compile(
     r"|min(?:utes)?sec(?:onds)?|mmss[sf]*"
 )
 _SECONDS, _COUNTED_FROM = ("seconds", "secs", "sec"), frozenset(("of", "since", "after", "from"))
+_OF_QUANTITIES = frozenset(itertools.chain(*ALIASES.values()))
 _TIMES, _OF_UTC = ("time", "timestamp", "stamp", "t"), ("utc", "gmt")  # and what may stand behind them
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
-_DAYS = re.compile(r".*[\s_.([-](mjd|jd|doy|excel)[)\]]?", re.IGNORECASE)  # the count of days at the end of a name
+_DAYS = re.compile(r"[\s_.([-](mjd|jd|doy|excel)[)\]]?", re.IGNORECASE)  # the count of days that a name ends with
 
 #: Units of other quantities, by which a column is known for something else.
 _FOREIGN = frozenset(
@@ -112,8 +114,8 @@ class Name(NamedTuple):
             if self.stem in aliases[quantity]:
                 return rank
         core = self.core()
-        known = core in (*ALIASES[quantity], *WEAK_ALIASES[quantity]) and core != self.stem
-        return 2 if known or (quantity == "time" and (self._is_of_a_time() or self._is_a_clock_face())) else 0
+        other = core != self.stem and core in (*ALIASES[quantity], *WEAK_ALIASES[quantity])
+        return 2 if other or (quantity == "time" and (self._is_of_a_time() or self._is_a_clock_face())) else 0
 
     def _is_of_a_time(self) -> bool:
         """Whether it is a time with words that say whose it is, or from when it counts."""
@@ -129,7 +131,7 @@ class Name(NamedTuple):
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
         words = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
-        if any(word in aliases for word in words for aliases in ALIASES.values()):  # such as theta_az
+        if not _OF_QUANTITIES.isdisjoint(words):  # such as theta_az
             words = [word for word in words if word not in EITHER_ANGLE]
         return "".join(word for k, word in enumerate(words) if not (k and word in _OF_UTC)).rstrip("0123456789")
 
@@ -155,7 +157,8 @@ def taken_apart(text: str, unit: str = "") -> Name:
     plain = EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
     if _is_a_clock(plain):
         return Name(text, _squeezed(plain), (_squeezed(plain),))
-    plain = _DAYS.sub(r"\1", plain)
+    *_, days = None, *_DAYS.finditer(plain)
+    plain = days[1] + plain[days.end() :] if days else plain
     found, notation, foreign = "", "", False
     opening = plain.rfind(_OPENING[_CLOSING.index(plain[-1])]) if plain.endswith(_CLOSING) else -1
     if opening >= 0:
@@ -196,20 +199,17 @@ def taken_apart(text: str, unit: str = "") -> Name:
 def units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) -> Iterator[tuple[int, str]]:
     """Column and unit, where a name of the quantity has a unit that is none of its units."""
     weak = {alias for alias in WEAK_ALIASES[quantity] if len(alias) > 2}.difference(ONLY_BY_UNIT)
-    for index in free:
-        name = apart[index]
-        if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()} or name.means(quantity):
-            continue
-        if quantity == "elevation" and unit_named("height", name.unit):
+    others = OTHER_THINGS.union(QUALIFIERS, _OF_QUANTITIES)
+    for index, name in ((index, apart[index]) for index in free):
+        height = quantity == "elevation" and unit_named("height", name.unit)
+        if name.foreign or height or NOT_UNITS & {*name.words, name.unit.lower()} or name.means(quantity):
             continue
         long = len(name.stem) > 1 or any(unit_named(quantity, word) for word in name.unit.split())
         if name.unit and ((name.stem in ALIASES[quantity] and long) or name.stem in weak):
             yield index, name.unit
         elif not name.unit and len(name.words) > 1 and name.words[-1].isalpha():
-            before, last = name._replace(words=name.words[:-1]).core(), name.words[-1]
-            if before in weak.union(ALIASES[quantity]) and last not in OTHER_THINGS.union(
-                QUALIFIERS, *ALIASES.values()
-            ):
+            before, last = name._replace(words=name.words[:-1]), name.words[-1]
+            if last not in others and before.core() in weak.union(ALIASES[quantity]):
                 yield index, last
 
 
