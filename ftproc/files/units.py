@@ -40,7 +40,7 @@ _LENGTHS = (
         Unit("kft", 304.8),
         Unit("cm", divide=1e2),
         Unit("mm", divide=1e3),
-        Unit("dmi", 1828.8),
+        Unit("dmi", 1828.8),  # data mile of radars: 6000 ft
         Unit("inch", 0.0254),
         Unit("usft", 1200.0, 3937.0),  # of surveys in the United States
         Unit("cable", 185.2),  # a tenth of a nautical mile
@@ -134,24 +134,14 @@ _OVER_TIME = re.compile(
 _OF_SPEEDS = {"s": 1.0, "h": 3600.0}
 
 _PREFIXES = {
-    "kilo": 3,
-    "k": 3,
-    "hecto": 2,
-    "h": 2,
-    "deca": 1,
-    "deka": 1,
-    "da": 1,
-    "deci": -1,
-    "d": -1,
-    "centi": -2,
-    "c": -2,
-    "milli": -3,
-    "m": -3,
-    "micro": -6,
-    "u": -6,
-    "μ": -6,
-    "nano": -9,
-    "n": -9,
+    **dict.fromkeys(("kilo", "k"), 3),
+    **dict.fromkeys(("hecto", "h"), 2),
+    **dict.fromkeys(("deca", "deka", "da"), 1),
+    **dict.fromkeys(("deci", "d"), -1),
+    **dict.fromkeys(("centi", "c"), -2),
+    **dict.fromkeys(("milli", "m"), -3),
+    **dict.fromkeys(("micro", "u", "μ"), -6),
+    **dict.fromkeys(("nano", "n"), -9),
 }
 _WITH_PREFIXES = ("m", "s", "rad", "deg", "gon", "grad", "turn", "arcsec")
 _LONGEST_SPELT = 80  # characters, factor and blanks included

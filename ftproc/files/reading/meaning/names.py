@@ -56,7 +56,7 @@ _SECONDS, _COUNTED_FROM = ("seconds", "secs", "sec"), frozenset(("of", "since", 
 _OF_QUANTITIES = frozenset(itertools.chain(*ALIASES.values()))
 _TIMES, _OF_UTC = ("time", "timestamp", "stamp", "t"), ("utc", "gmt")  # and what may stand behind them
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
-_DAYS = re.compile(r"[\s_.([-](mjd|jd|doy|excel)[)\]]?", re.IGNORECASE)  # the count of days that a name ends with
+_DAYS = re.compile(r"[\s_.([-](mjd|jd|doy|excel)[)\]]?", re.IGNORECASE)  # the count of days in a name
 
 #: Units of other quantities, by which a column is known for something else.
 _FOREIGN = frozenset(

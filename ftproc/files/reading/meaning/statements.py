@@ -43,8 +43,6 @@ _COUNTDOWN = re.compile(
     r"(?:t|time)(?:to|till|until|before)\w+|(?:t|time)(?:minus|remaining|left)|countdown|remainingtime|tgo|ttg"
 )
 _LONGEST_LINE = 300  # characters
-
-
 _NUMBER = r"(\d{1,7}(?:[.,]\d{1,9})?)"
 _SAMPLED = r"(?:frame|sampl\w*|update|data|output|logging|recording|measurement|acquisition|scan|image|abtast|bild)"
 #: How many frames there are in a second, or what one takes.
