@@ -11,7 +11,6 @@ import numpy as np
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS
 from ftproc.core.live.beside import RATE
-from ftproc.core.live.pace import WINDOW_SAMPLES, WORK_S
 from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.rows import Waiting, with_stand_ins
 from ftproc.core.live.window import Window
@@ -56,24 +55,19 @@ def _relative_sigma(window: Window) -> float:
 
 class Doubt(NamedTuple):
     """When all of the window is edited for a track in doubt: not before this row and this time. since_s: when it first
-    was and stayed in doubt; NaN where it is not. edited_s: when all of the window was last decided on."""
+    was and stayed in doubt; NaN where it is not."""
 
     row: int = 0
     time_s: float = -math.inf
     since_s: float = math.nan
-    edited_s: float = -math.inf
 
     def is_due(self, window: Window, row: int) -> bool:
         """Whether an edit for a track in doubt is due."""
         return row >= self.row and float(window.time_s[-1]) >= self.time_s
 
-    def is_urgent(self, window: Window) -> bool:
-        """Whether an edit for a track in doubt is not put off: but where many rows come in no time."""
-        return len(window) <= WINDOW_SAMPLES[1] or float(window.time_s[-1]) - self.edited_s >= WORK_S
-
     def after_edit(self, window: Window, row: int) -> Doubt:
         now_s = float(window.time_s[-1])
         if not window.in_doubt():
-            return Doubt(row + SAMPLES, now_s + AGAIN_S, edited_s=now_s)
+            return Doubt(row + SAMPLES, now_s + AGAIN_S)
         since_s = now_s if math.isnan(self.since_s) else self.since_s
-        return Doubt(row + SAMPLES, now_s + max(AGAIN_S, GROWTH * (now_s - since_s)), since_s, now_s)
+        return Doubt(row + SAMPLES, now_s + max(AGAIN_S, GROWTH * (now_s - since_s)), since_s)

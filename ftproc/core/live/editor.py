@@ -45,8 +45,7 @@ class LiveEditor:
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
-        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is edited,
-        self.urgent = False  # as soon as may be
+        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is edited
         self.refreshed = 0  # rows that the last refresh has seen
         self.held = Waiting.nothing()  # rows that are taken when there is something to do
         self.put_off = False  # whether there may be something to do before the next row is taken
@@ -224,7 +223,6 @@ class LiveEditor:
         doubted = in_doubt and self.count >= self.next_refresh and self.doubt.is_due(window, self.count)
         if window.under_way is None and (doubted or self.count >= self.next_edit):
             self.doubted, self.next_work = in_doubt, self.count
-            self.urgent = in_doubt and self.doubt.is_urgent(window)
             self.next_edit = self.count + samples_between_edits(self.count, window.learns)
             self.pace = pace_of(window.time_s, self.lag_s)
             window.sizes = self.pace.sizes
@@ -238,10 +236,10 @@ class LiveEditor:
             self._refresh(window)
 
     def _go_on(self, window: Window) -> None:
-        """A turn at the edit of all of the window, or the whole of it."""
+        """A turn at the edit of all of the window."""
         self.next_work = self.count + self.pace.turn
         try:
-            window.go_on(HASTE * self.pace.work if self.urgent else self.pace.work)
+            window.go_on(HASTE * self.pace.work if self.doubted else self.pace.work)
         except ValueError:  # a component has too few readings that agree
             window.refresh()
         if window.under_way is None:

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ftproc.core.live.window import Window
 from ftproc.methods import live
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
@@ -260,3 +261,19 @@ def test_what_is_put_off_may_be_done_at_any_moment(flight, lag_s):
     assert (put_off > 0.1 * len(log)) == (lag_s > 0)
     state, whole = (np.concatenate([each.rows["state"] for each in some]) for some in (found, at_once))
     np.testing.assert_array_equal(state, whole)
+
+
+def test_a_track_in_doubt_is_edited_bit_by_bit(monkeypatch):
+    """In more turns than one, each of three times the work of others."""
+    log, turns, go_on = simulate("manoeuvre", seed=1, duration_s=20.0, dt_s=0.01).log, [], Window.go_on
+
+    def counted(window, samples):
+        go_on(window, samples)
+        turns.append((samples if samples == np.inf else round(samples / editor.pace.work), window.under_way is None))
+
+    monkeypatch.setattr(Window, "go_on", counted)
+    editor = live.editor(FilterSettings(editing="live", lag_s=0.5))
+    editor.push(log.time_s, log.measurement)
+    of_doubt = [done for work, done in turns if work == 3]
+    assert {work for work, _ in turns} == {np.inf, 1, 3}  # all at once where a track begins
+    assert len(of_doubt) > sum(of_doubt) > 0

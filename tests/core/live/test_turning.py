@@ -36,6 +36,23 @@ def test_a_manoeuvre_is_followed_better(flight, editing, most):
         assert errors[0] < most * errors[1]
 
 
+def test_a_manoeuvre_is_followed_better_without_elevations(flight):
+    """In what is seen: range and azimuth."""
+    log, errors = flight.log, []
+    measurement = np.column_stack([log.measurement[:, :2], np.full(len(log), np.nan)])
+    polar = np.column_stack(
+        [np.linalg.norm(flight.truth.position_m, axis=1), np.arctan2(*flight.truth.position_m[:, 1::-1].T)]
+    )
+    for motion in ("auto", "white-jerk"):
+        editor = live.editor(FilterSettings(editing="live", motion=motion))
+        rows = np.concatenate([each.rows for each in editor.push(log.time_s, measurement)])
+        x, y, z = rows["state"][:, :3].T
+        off = np.column_stack([np.sqrt(x**2 + y**2 + z**2), np.arctan2(y, x)]) - polar
+        off[:, 1] = np.angle(np.exp(1j * off[:, 1]))
+        errors.append(np.sqrt((off[log.time_s > 8.0] ** 2).mean(0)))
+    assert (errors[0] < 0.98 * errors[1]).all()
+
+
 @pytest.mark.parametrize("settings", [{"motion": "white-jerk"}, {"jerk_psd_m2ps5": 10.0}])
 def test_white_jerk_that_is_asked_for_is_alone(flight, settings):
     editor, _ = rows_of(flight, **settings)
