@@ -160,7 +160,7 @@ def test_a_full_disk(place: Path, command: str, environment: dict[str, str]) -> 
     )
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("more", [(), ("--follow",)], ids=["filter", "follow"])
 @pytest.mark.parametrize("read", [False, True], ids=["no reader", "a reader that stalls"])
 def test_a_named_pipe(place: Path, number: signal.Signals, more: tuple[str, ...], read: bool) -> None:

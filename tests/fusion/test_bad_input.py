@@ -137,7 +137,7 @@ def test_options_that_mean_nothing(run, folder):
     assert (folder / "radar.csv").read_text().startswith("time_s")
 
 
-@pytest.mark.parametrize("station", ["radar", "theodolite2"])
+@pytest.mark.parametrize("station", [pytest.param("radar", marks=pytest.mark.slow), "theodolite2"])
 def test_a_station_a_kilometre_off_its_place(run, folder, station):
     path = folder / "range.toml"
     head, _, tail = path.read_text().partition(f"[station.{station}]")

@@ -175,9 +175,10 @@ def test_segment_without_a_component_looks_farther(flight, in_segments):
     assert (part.estimate.run.since_start[part.low : part.high] > 0).all()
 
 
-def test_specified_noise_is_taken(flight, in_segments):
+def test_specified_noise_is_taken(in_segments):
     in_segments(1500, 1000, 200)
-    cut = pipeline.filter_log(start_of(flight.log, 2000), FilterSettings(noise=(7.0, None, None), jerk_psd_m2ps5=5.0))
+    log = simulate("cruise", seed=0, duration_s=200.0, dt_s=0.1).log
+    cut = pipeline.filter_log(log, FilterSettings(noise=(7.0, None, None), jerk_psd_m2ps5=5.0))
     settings = cut.metadata["settings"]
     assert settings["noise_range_m"] == pytest.approx(7.0)
     assert cut.metadata["summary"]["jerk_psd_m2ps5"]["median"] == pytest.approx(5.0)

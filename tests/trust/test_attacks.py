@@ -1,4 +1,4 @@
-"""A few attacks of each generator; `make trust` makes them all."""
+"""An attack of each generator; `make trust` makes them all."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries that make 
 @pytest.mark.parametrize("generator", GENERATORS, ids=lambda generator: generator.__name__)
 def test_none_is_lost(generator: Callable[[random.Random], Iterator[Attack]]) -> None:
     made = list(generator(random.Random("a few")))
-    for each in random.Random(generator.__name__).sample(made, 2):
-        assert running.lost(each) == "", each.name
+    each = random.Random(generator.__name__).choice(made)
+    assert running.lost(each) == "", each.name
 
 
 def test_there_are_many_and_each_has_its_name() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from tests.trust import streams
 
-MANY, PARTS = 75, 24  # streams, and parts of them, of which two are tried here
+MANY, PARTS = 75, 40  # streams, and parts of them, of which one is tried here
 MOST_MEMORY_KB = 3 << 19  # 1.5 GB
 
 
