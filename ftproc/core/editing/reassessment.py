@@ -22,7 +22,7 @@ from ftproc.core.editing.runs import confirmed, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
-from ftproc.core.identification.likelihood import NOISE_SHRINKS
+from ftproc.core.identification.likelihood import NOISE_GROWTH, NOISE_SHRINKS
 from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.profile import fit_profile, median_level, pieces, roughness
 from ftproc.core.identification.scales import scales_of
@@ -190,7 +190,8 @@ def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Recor
 
 def finer_noise(found: tuple[Record, Decision], begin: Begin) -> Iterator[tuple[Record, Decision]]:
     """The decisions made again from less and less noise, while that is likelier, where the readings hardly tell noise
-    from motion: the noise is the least that screening allows, or the filter remembers few of them, or most."""
+    from motion: the noise is the least that screening allows, or the most, or the filter remembers few of them, or
+    nearly all."""
     for _ in range(FINEST):
         record, decision = found
         if record.fixed.noise.all() or not _may_be_motion(record, decision):
@@ -204,10 +205,11 @@ def finer_noise(found: tuple[Record, Decision], begin: Begin) -> Iterator[tuple[
 
 def _may_be_motion(record: Record, decision: Decision) -> bool:
     """Whether some of the noise may be motion, or of the motion noise."""
-    model = decision.model
-    at_least = model.noise_variance <= AT_LEAST * (record.sigma / NOISE_SHRINKS) ** 2
-    memory = scales_of(record.weighted(decision.weight), model.noise_variance).memory_samples(float(model.jerk[0, 0]))
-    return bool((at_least & ~record.fixed.noise).any()) or not SHORT_MEMORY < memory < LONG_MEMORY * len(record.time_s)
+    model, variance = decision.model, decision.model.noise_variance
+    least, most = (record.sigma / NOISE_SHRINKS) ** 2, (NOISE_GROWTH * record.sigma) ** 2
+    bound = ~record.fixed.noise & ((variance <= AT_LEAST * least) | (AT_LEAST * variance >= most))
+    memory = scales_of(record.weighted(decision.weight), variance).memory_samples(float(model.jerk[0, 0]))
+    return bool(bound.any()) or not SHORT_MEMORY < memory < LONG_MEMORY * len(record.time_s)
 
 
 def log_probability(record: Record, decision: Decision) -> float:
