@@ -23,7 +23,7 @@ from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import FOLLOWED, MARGIN, MOST_EACH, Scanned, in_whole, weighed_on, worth
 from ftproc.core.editing.lasting.screen import ELEVATED, leaves_curves, may_leave_curves, others_as_usual
-from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
+from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.profile import pieces
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
@@ -202,6 +202,8 @@ def likeliest_followed(seen: Scanned) -> Found | None:
             null = max(without(*span, False), without(*span, True), weighed_on(part, near, runs), key=_likelihood)
             best = of_any_shape(part, first)
             best = max(best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=_likelihood)
+            if stretches in waves:  # motion may be as agile
+                null = max(null, as_it_is(part, part.log.weight, best.model), key=_likelihood)
             gain = best.log_probability - null.log_probability + seen.prior(best.curves)
             least = MARGIN if stretches in waves else FOLLOWED
             if least < gain < MOST_EACH * part.possible.sum():
