@@ -52,7 +52,7 @@ def _no_reading(measurement: Any, *_: Any) -> Any:
     return np.zeros(np.shape(measurement), bool)
 
 
-def _as_read(time_s: Any, measurement: Any) -> Any:
+def _as_read(time_s: Any, measurement: Any, *_: Any) -> Any:
     return measurement.copy(), np.zeros(measurement.shape, np.uint8)
 
 
@@ -151,6 +151,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "another start": (Off(TWO_PASS, "_forgets", lambda *_: False),),
     "reassessment": (Off(TWO_PASS, "reassess", _second),),
     "turns taken for patches": (Off(TWO_PASS, "screen", _same_screen),),
+    "decisions from all readings on": (Off(TWO_PASS, "rejects_runs", lambda *_: False),),
     "curves through long gaps": (Off("ftproc.methods.bridging", "bridged", bridging.none),),
     "far less noise": (Off(TWO_PASS, "with_less_noise", _first),),
     "less noise of slow readings": (Off(TWO_PASS, "finer_noise", _empty),),

@@ -38,6 +38,7 @@ MARGIN = 5.0  # in log-probability, by which the decisions made again may be les
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be preferred
 OTHER_LEVEL = 2.5  # times the process noise at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
+LONG = 4  # rejected readings in a row, for which decisions from all readings on are made, too
 STANDS_OUT = 64.0  # times the median of the jerk profile
 LONGEST_SPAN = 3000  # samples that are decided together
 AT_LEAST = 1.02  # times the least noise that is allowed: less of it is at its bound
@@ -169,6 +170,12 @@ def preferred(found: tuple[Record, Decision], other: tuple[Record, Decision]) ->
     """The other hypothesis, if it is likelier and does not reject many more readings to be so."""
     least = found[1].weight.sum() - FEW_MORE * found[0].possible.sum()
     return likelier(found, other) if other[1].weight.sum() > least else found
+
+
+def rejects_runs(record: Record, decision: Decision) -> bool:
+    """Whether the decisions reject readings of a component in a row."""
+    rejected = (decision.weight[record.possible[:, c], c] <= 0 for c in range(3))
+    return any(len(runs_of(each, LONG)) > 0 for each in rejected)
 
 
 def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Record, Decision]:

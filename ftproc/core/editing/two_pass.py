@@ -37,6 +37,7 @@ from ftproc.core.editing.reassessment import (
     log_probability,
     preferred,
     reassess,
+    rejects_runs,
     with_less_noise,
 )
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
@@ -58,6 +59,9 @@ STIFFER = 100.0  # times less jerk by the spans of a long log than at the start 
 # they lie between its turns; from 170, where patches are left that motion would follow up to 30
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
+TURNS = (
+    100.0  # gain in log-probability of decisions from all readings on: 120 to 1,900 where turns had been screened out
+)
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
 MOST_REJECTED = 0.2  # of a component: where more is, it is not yet told what the noise is
@@ -204,6 +208,10 @@ def _decided(
         other = begin(record, jumps_only * possible)
         takes_in = (other[1].weight > found[1].weight).any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
+            found = preferred(found, _examined(*other, known))
+    elif rejects_runs(*found):  # nothing has spoken against what screening took for patches
+        other = begin(record, possible.astype(float))
+        if log_probability(*other) > log_probability(*found) + TURNS:
             found = preferred(found, _examined(*other, known))
     return found
 
