@@ -1,5 +1,5 @@
 """What instruments see that read seldom: a total station of a drone, which is agile, and a laser ranger whose angles
-have stamps of their own; and an aircraft that holds, whose turns are short and far apart."""
+have stamps of their own; an aircraft that holds, whose turns are short and far apart; and a glider that circles."""
 
 from __future__ import annotations
 
@@ -53,6 +53,23 @@ def holding(seed: int, dt_s: float, lasts_s: float) -> tuple[MeasurementLog, Flo
     every = round(dt_s / step_s)
     position = np.column_stack([along + np.array([5e4, -6e4]), np.full(len(time), 6e3)])[::every]
     return _noisy(position, time[::every], (8.0, 4e-4, 6e-4), rng), position
+
+
+def soaring(seed: int) -> tuple[MeasurementLog, FloatArray]:
+    """A log of a glider that glides and climbs in circles of some 20 s, four times each, as a radar sees it once a
+    second: 10 m and 0.5 mrad. And the true positions (n, 3) m."""
+    rng = np.random.default_rng(seed)
+    step_s, speed_mps, legs = 0.1, 27.0, list[FloatArray]()
+    for _ in range(4):
+        legs.append(np.zeros(int(rng.uniform(600, 1500))))
+        circles = int(rng.uniform(600, 2400))
+        legs.append(np.full(circles, rng.choice([-1, 1]) * 2 * np.pi / rng.uniform(16, 26)))
+    rate = np.convolve(np.concatenate(legs), np.ones(30) / 30, "same")
+    heading = rng.uniform(0, 2 * np.pi) + step_s * np.cumsum(rate)
+    along = step_s * speed_mps * np.cumsum(np.stack([np.cos(heading), np.sin(heading)], 1), axis=0)
+    height = 1000 + step_s * np.cumsum(np.where(np.abs(rate) > 0.1, 2.0, -1.0))
+    position = np.column_stack([along + np.array([4000.0, 1500.0]), height])[::10]
+    return _noisy(position, np.arange(float(len(position))), (10.0, 5e-4, 5e-4), rng), position
 
 
 def read(

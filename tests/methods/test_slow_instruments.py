@@ -14,7 +14,7 @@ from ftproc.core.identification import likelihood
 from ftproc.core.model.motion import isotropic
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
-from tests.drone import CRUISER, FAR, apart, holding, read, seen
+from tests.drone import CRUISER, FAR, apart, holding, read, seen, soaring
 
 
 def outcome(seed, dt_s, sigma):
@@ -31,6 +31,14 @@ def outcome(seed, dt_s, sigma):
 def test_never_wrong_and_consistent(seed, dt_s, sigma):
     _, far, verdict = outcome(seed, dt_s, sigma)
     assert far < 0.01 or verdict != "consistent"
+
+
+def test_circles_are_no_patches():
+    """Screening had taken some for a patch, and with these rejected the decisions stood still."""
+    log, position = soaring(78)
+    found = pipeline.filter_log(log, FilterSettings(smooth=True))
+    assert np.sqrt(((found.state[:, :3] - position) ** 2).sum(1).mean()) < 3.4
+    assert found.metadata["summary"]["trust"]["verdict"] == "consistent"
 
 
 def test_motion_is_not_taken_for_noise():
@@ -92,7 +100,13 @@ def test_turns_are_followed_live(seed):
 
 @pytest.mark.parametrize(
     ("seed", "dt_s", "lasts_s"),
-    [(1, 0.1, 1200.0), (2, 0.1, 1200.0), (3, 0.1, 1200.0), pytest.param(4, 0.1, 6500.0, marks=pytest.mark.slow)],
+    [
+        (1, 0.1, 1200.0),
+        (2, 0.1, 1200.0),
+        (3, 0.1, 1200.0),
+        pytest.param(4, 0.1, 6500.0, marks=pytest.mark.slow),
+        (404, 0.1, 1200.0),  # whose noise was said to be three times what it is
+    ],
 )
 def test_turns_between_the_spans_that_stand_for_a_long_log_are_flown(seed, dt_s, lasts_s):
     """They were taken for outliers, and the track was lost, by up to 200 km; the last is edited in segments."""
@@ -100,3 +114,10 @@ def test_turns_between_the_spans_that_stand_for_a_long_log_are_flown(seed, dt_s,
     found = pipeline.filter_log(log, FilterSettings(smooth=True))
     assert np.sqrt(((found.state[:, :3] - position) ** 2).sum(1).mean()) < 10
     assert found.metadata["summary"]["trust"]["verdict"] == "consistent"
+
+
+def test_a_turn_is_no_wave():
+    """The process noise was found of a patch that goes to and fro, and not of the turn: the track was 936 m off."""
+    log, position = holding(300, 0.1, 1200.0)
+    found = pipeline.filter_log(log, FilterSettings(smooth=True))
+    assert np.sqrt(((found.state[:, :3] - position) ** 2).sum(1).mean()) < 10
