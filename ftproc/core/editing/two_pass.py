@@ -59,9 +59,7 @@ STIFFER = 100.0  # times less jerk by the spans of a long log than at the start 
 # they lie between its turns; from 170, where patches are left that motion would follow up to 30
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
-TURNS = (
-    100.0  # gain in log-probability of decisions from all readings on: 120 to 1,900 where turns had been screened out
-)
+TURNS = 100.0  # in log-probability, by which decisions from all readings on must be better: 120 or more at turns
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
 MOST_REJECTED = 0.2  # of a component: where more is, it is not yet told what the noise is
@@ -209,7 +207,7 @@ def _decided(
         takes_in = (other[1].weight > found[1].weight).any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
             found = preferred(found, _examined(*other, known))
-    elif rejects_runs(*found):  # nothing has spoken against what screening took for patches
+    elif not work.of_window and rejects_runs(*found):  # what screening took for patches was believed
         other = begin(record, possible.astype(float))
         if log_probability(*other) > log_probability(*found) + TURNS:
             found = preferred(found, _examined(*other, known))
