@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import beside as layout
@@ -27,12 +28,10 @@ Labels = NDArray[np.uint8]
 
 FEWEST = 16  # scalars that tell their noise
 ROUNDS, STILL = 8, 0.02  # of deciding, and the change of ln(noise variance) with which they end
-SURE = 8.0  # in log-likelihood, by which the other sense must be likelier, or that they are late
 LEAST_LATE = 0.05  # of an interval, by which they must be late
 TAILS = 4.0  # degrees of freedom of the distribution that tells the sense
 FAR = 6.0  # sigmas from what the readings say, of a scalar that is not used to begin with
 MOST_REJECTED = 0.5  # share of those that contradict the readings: with more, none is used
-CONTRADICTS = 8.0  # in log-likelihood, by which they may make the readings less likely, by chance
 HINDERS = "the {} make the readings less likely (biased, late, or not measured): none is used"
 TURN = 0.1  # of the interval, 1-sigma, up to which the readings tell the turn of an ambiguous range rate
 LEAST = 1e-4  # m/s or m, 1-sigma: no instrument is so good
@@ -109,7 +108,7 @@ def understood(
         there &= predicted < (TURN * interval) ** 2
         value, unused = np.where(there, value, np.nan), unused._replace(weight=unused.weight * there)
     outward, inward = (_nearest(each - expected, interval) for each in (value, -value))
-    closing = _cost(outward, predicted) > _cost(inward, predicted) + SURE
+    closing = _cost(outward, predicted) > _cost(inward, predicted) + odds.SURE
     off = np.where(there, inward if closing else outward, np.nan)
     value = expected + off if interval > 0 else -value if closing else value
     sigma = max(min(SCALE * median(np.abs(off[there])), _scatter(value)), _least(value))
@@ -148,7 +147,7 @@ def lateness(log: Observations, model: Model, starts: list[Start]) -> tuple[floa
 
     low, here, high = map(likely, (-step, 0.0, step))
     rise, bend = (high - low) / 2, 2 * here - low - high
-    if not (bend > 0 and rise**2 / (2 * bend) > SURE):
+    if not (bend > 0 and rise**2 / (2 * bend) > odds.SURE):
         return 0.0, growth
     late_s = step * rise / bend
     return (late_s if abs(late_s) > LEAST_LATE * step else 0.0), growth

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import beside, impact
+from ftproc.core import beside, impact, odds
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.records import Model, Observations, Scalars, Start
@@ -190,7 +190,7 @@ def _with_profile(
         channel = channel._replace(rates=rates, label=beside.labels_of(rates.weight, rates.value))
     both = with_(channel.rates)
     of_the_log = likelihood_of(log, without, starts)
-    if beside.of_the_rest(both, model, starts, kind) < of_the_log - beside.CONTRADICTS:
+    if beside.of_the_rest(both, model, starts, kind) < of_the_log - odds.SURE:
         return log, without, channel.left_out(beside.HINDERS.format("heights" if of_heights else "range rates"))
     return both, model, channel
 
@@ -205,7 +205,7 @@ def upward(log: Observations, model: Model, starts: list[Start]) -> Model:
     that makes the log likelier."""
     found = model._replace(jerk=np.column_stack([model.jerk[:, :2], profile(log, model, starts).jerk[:, 2]]))
     gained = likelihood_of(log, found, starts) - likelihood_of(log, model, starts)
-    return found if gained > beside.SURE else model
+    return found if gained > odds.SURE else model
 
 
 def _offset(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from ftproc.core import odds
 from ftproc.core.identification.motions import motion_models
-from ftproc.core.identification.motions.motion_models import MARGIN, MODELS, WHITE, Candidates
+from ftproc.core.identification.motions.motion_models import MODELS, WHITE, Candidates
 from ftproc.core.model.frames import from_cartesian
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
@@ -51,7 +53,7 @@ def test_the_readings_choose_how_an_aircraft_moves(stations, flight):
     plain, found = fused(seen, WHITE), fused(seen, *MODELS)
     ((motion, rows),) = found.motions
     assert motion.name == "turning-force"
-    assert motion.gain > MARGIN
+    assert motion.gain > odds.SURE
     assert rows == sum(len(station.time_s) for station in seen)
     assert plain.motions[0][0] == motions.Motive(WHITE, 0.0)
     assert velocity_error(found, flight, zero_s) < 1.02 * velocity_error(plain, flight, zero_s)
@@ -82,7 +84,7 @@ def test_a_motion_that_the_filter_does_not_follow_gives_way_to_white_jerk(statio
         return run._replace(log_likelihood=run.log_likelihood + (1e4 if model.motion.acts == better else 0.0))
 
     monkeypatch.setattr(motions, "filtered", rated)
-    monkeypatch.setattr(motion_models, "MARGIN", -math.inf)
+    monkeypatch.setattr(motion_models, "odds", SimpleNamespace(SURE=-math.inf))
     smoothed, filtered = (fused(stations[0], WHITE, "turning-force", smooth=smooth) for smooth in (True, False))
     assert [name for (name, _, _), _ in smoothed.motions] == ["turning-force"]
     assert [name for (name, _, _), _ in filtered.motions] == ["turning-force" if better else WHITE]

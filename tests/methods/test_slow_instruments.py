@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
+from ftproc.core import odds
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.smoother import likelihood_of
@@ -69,13 +70,13 @@ def test_most_noise_is_within_the_doubt():
     found = likelihood.most_noise(observations, model, starts, np.full((len(log), 3), 1e3))
     assert found is not None
     lost = likelihood_of(observations, model, starts) - likelihood_of(observations, found, starts)
-    assert lost <= likelihood.DOUBT
+    assert lost <= odds.POSSIBLE
     for c in range(3):
         more = found.noise_variance.copy()
         more[c] *= likelihood.NOISE_STEP**2
         worse = likelihood_of(observations, found._replace(noise_variance=more), starts)
         limit = likelihood.NOISE_STEP ** (2 * likelihood.NOISE_STEPS) * model.noise_variance[c]
-        assert worse < likelihood_of(observations, model, starts) - likelihood.DOUBT or found.noise_variance[c] >= limit
+        assert worse < likelihood_of(observations, model, starts) - odds.POSSIBLE or found.noise_variance[c] >= limit
 
 
 @pytest.mark.parametrize(("dt_s", "late_s", "most_m"), [(5.0, 0.006, 15.0), (0.5, 0.001, 1.0)])

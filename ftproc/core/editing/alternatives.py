@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.editing.patch_likelihood import SHORTEST_RUN
 from ftproc.core.filtering.initialization import find_starts
@@ -30,8 +31,6 @@ LENGTHS = (4, 6, 9, 13, 19, 28, 40)  # samples beside a rejected run, or at an e
 GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end at
 AROUND = 80  # samples on each side that the comparison covers
 ROUNDS = 5
-MARGIN = 5.0  # by which the log-probability of another decision must be better,
-AT_EDGE = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
 HOPELESS = 400.0  # by which a longer patch must not be worse, for a shorter one to be tried: ten for each reading
 MOST = 100  # comparisons in one round
 STEPS = 14  # of filling a hole, or of taking out what stands out most
@@ -119,7 +118,7 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
             continue
         search.work.left -= len(steps) * len(part.time_s)
         likeliest = max(steps, key=lambda step: step.likelihood)
-        if likeliest.likelihood > steps[0].likelihood + MARGIN:
+        if likeliest.likelihood > steps[0].likelihood + odds.LIKELIER:
             result[near] = likeliest.weight
     return result
 
@@ -139,7 +138,7 @@ def _at_edges(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatAr
             continue
         search.work.left -= sum(len(step.weight) for step in steps)
         best = max(steps, key=lambda step: step.likelihood)
-        if best.likelihood > steps[0].likelihood + AT_EDGE:
+        if best.likelihood > steps[0].likelihood + odds.ONE_END:
             found.append((best.likelihood - steps[0].likelihood, edge, near, best.weight))
     result, changed = weight.copy(), np.zeros(len(weight), bool)
     for _, edge, near, other in sorted(found, key=lambda each: -each[0]):

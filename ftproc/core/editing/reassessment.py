@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.components import any_of
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
@@ -34,7 +35,6 @@ Begin = Callable[[Record, FloatArray], tuple[Record, Decision]]
 
 ROUNDS = 6
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
-MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be preferred
 OTHER_LEVEL = 2.5  # times the process noise at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
@@ -44,8 +44,7 @@ LONGEST_SPAN = 3000  # samples that are decided together
 AT_LEAST = 1.02  # times the least noise that is allowed: less of it is at its bound
 MANY, FAR_LESS = 2, 0.25  # components of which that is so, and the share of their noise that must be enough: where less
 # comes of it, it is readings of a patch that were rejected
-LESS, LESS_LIKELIER = 3.0, 3.0  # times less noise of a component, or more; and by how much likelier that must be, in
-# log-probability
+LESS = 3.0  # times less noise of a component, or more
 SHORT_MEMORY, LONG_MEMORY = 8.0, 0.5  # samples, and share of the log: between them less noise was never likelier
 FINER, FINEST = 16.0, 3  # times less noise, and how often
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
@@ -147,7 +146,7 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
     found = decision._replace(model=profile, unexamined=len(search.unexamined - search.tried))
     if (found.weight != first.weight).any() and log_probability_as_it_is(record, found) < log_probability_as_it_is(
         record, first
-    ) - MARGIN:
+    ) - odds.LIKELIER:
         return first._replace(rounds=found.rounds, unexamined=found.unexamined)
     return found
 
@@ -204,7 +203,7 @@ def finer_noise(found: tuple[Record, Decision], begin: Begin) -> Iterator[tuple[
         if record.fixed.noise.all() or not _may_be_motion(record, decision):
             return
         other = begin(record._replace(sigma=record.sigma / LESS), record.screened)
-        if preferred(found, other) is found or log_probability(*other) < log_probability(*found) + LESS_LIKELIER:
+        if preferred(found, other) is found or log_probability(*other) < log_probability(*found) + odds.POSSIBLE:
             return
         yield other
         found = other

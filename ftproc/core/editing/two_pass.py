@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.copies import without_copies
@@ -29,7 +30,7 @@ from ftproc.core.editing.decisions import (
 )
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import MOTION, STEP, Faults, Shift, others, refined
-from ftproc.core.editing.lasting.rejected.rejected_runs import OPEN, reassess_rejected
+from ftproc.core.editing.lasting.rejected.rejected_runs import reassess_rejected
 from ftproc.core.editing.lasting.settling import Understood, without_lasting
 from ftproc.core.editing.reassessment import (
     finer_noise,
@@ -59,14 +60,11 @@ STIFFER = 100.0  # times less jerk by the spans of a long log than at the start 
 # they lie between its turns; from 170, where patches are left that motion would follow up to 30
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
-TURNS = 100.0  # in log-probability, by which decisions from all readings on must be better: 120 or more at turns
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
 MOST_REJECTED = 0.2  # of a component: where more is, it is not yet told what the noise is
-REJECTED, GROWN = 0.05, 100.0  # of a component: where more is, noise may have grown; the gain in log-probability with
-# which it has: up to 75 at take-offs and patches, from 577 where noise is tenfold for a third of a log
+REJECTED = 0.05  # of a component: where more is, noise may have grown
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
-HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
 
 
@@ -156,7 +154,9 @@ def edit(
     otherwise = () if scene is None else others(read, possible, decision.model, scene.setting, steps, rivals, first)
     leaning = [] if live else _one_sided(log, decision.model, record.rounding)
     shifts += tuple(Shift(one.component, 0, len(time_s), one.sigma) for one in leaning)
-    said = tuple(rival for rival in rivals if rival.chosen != MOTION or rival.other != STEP if rival.gain < OPEN)
+    said = tuple(
+        rival for rival in rivals if rival.chosen != MOTION or rival.other != STEP if rival.gain < odds.LIKELIER
+    )
     faults = Faults(copied, (*steps, *doubtful), shifts, tuple(leaning), said)
     log = one_sided.without(log, leaning)
     return Edited(log, decision.model, decision.starts, decision, faults, tuple(otherwise))
@@ -205,11 +205,11 @@ def _decided(
     if jerk_psd is None and found[1].stamp_s == 0 and not found[1].settled:  # turns may have been taken for patches
         other = begin(record, jumps_only * possible)
         takes_in = (other[1].weight > found[1].weight).any()
-        if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
+        if takes_in and log_probability(*other) > log_probability(*found) - odds.HOPELESS:
             found = preferred(found, _examined(*other, known))
     elif not work.of_window and rejects_runs(*found):  # what screening took for patches was believed
         other = begin(record, possible.astype(float))
-        if log_probability(*other) > log_probability(*found) + TURNS:
+        if log_probability(*other) > log_probability(*found) + odds.ANEW:
             found = preferred(found, _examined(*other, known))
     return found
 
@@ -262,7 +262,7 @@ def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record,
         before, found = found, likelier(found, allow_for_drift(*found))
         if _rejects_many(*before, REJECTED):
             grown = allow_for_drift(*before, rejected=True)
-            if log_probability(*grown) > log_probability(*found) + (0.0 if found[1].drifts else GROWN):
+            if log_probability(*grown) > log_probability(*found) + (0.0 if found[1].drifts else odds.ANEW):
                 found = grown
         if found is before or found[1].weight.sum() <= before[1].weight.sum():
             break
@@ -283,7 +283,7 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
     many = record.possible.sum() - decision.weight.sum() > MOST_LATE * record.possible.sum()
     for imprecise in IMPRECISE:
         found = allow_for_late_stamps(record, decision, stamps, imprecise)
-        if many and log_probability(*found) < log_probability(record, decision) - HOPELESS:
+        if many and log_probability(*found) < log_probability(record, decision) - odds.HOPELESS:
             continue  # they are patches of outliers
         for _ in range(STAMP_ROUNDS):
             before, found = found, preferred(found, allow_for_very_late_stamps(*found, imprecise, record))

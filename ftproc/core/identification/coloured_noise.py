@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, score_log
 from ftproc.core.identification import optimizer
@@ -35,14 +36,12 @@ FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 3
 SHORTEST_TAU, LONGEST_TAU = 0.3, 0.5  # intervals, and spans of the log
 LARGEST = 1e4  # times the variance that white noise would have
 NEGLIGIBLE = 0.02  # share of a component's variance, and correlation of neighbours
-LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
-REFUTED = 0.5  # in log-likelihood, by which another component may be less likely: one standard deviation
 INDEPENDENT = 20.0  # correlation times that a log must last for noise and motion to be separated
 
 
 class Coloured(NamedTuple):
     """The likeliest model with correlated noise, and those whose noise is correlated over as short, and over as long a
-    time, as the log allows. likelier: the first is likelier than that of white noise by LEAST_GAIN for each component;
+    time, as the log allows. likelier: the first is likelier than that of white noise by odds.SURE for each component;
     possible: by that once. separable: the log lasts long enough to tell such noise, if it is fast, from motion."""
 
     model: Model
@@ -100,8 +99,8 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
         model,
         fastest,
         slowest,
-        likelier=bool(correlated.any()) and gain > LEAST_GAIN * int(correlated.sum()),
-        possible=bool(correlated.any()) and gain > LEAST_GAIN,
+        likelier=bool(correlated.any()) and gain > odds.SURE * int(correlated.sum()),
+        possible=bool(correlated.any()) and gain > odds.SURE,
         separable=float(fastest.tau_s[correlated].max(initial=0.0)) < scales.span_s / INDEPENDENT,
     )
 
@@ -149,7 +148,7 @@ class _Search:
         Over a few samples an offset of twice the variance and twice the correlation time is the same, and what is
         slower than that, motion."""
         for c in range(3):
-            least = likelihood_of(self.log, self.model(theta), self.starts) - REFUTED
+            least = likelihood_of(self.log, self.model(theta), self.starts) - odds.REFUTED
             while True:
                 other = theta.copy()
                 other[[3 + c, 6 + c]] += math.log(factor)

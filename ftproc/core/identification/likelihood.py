@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.memory import Scores
 from ftproc.core.filtering.records import Model, Observations, Start
@@ -42,7 +43,6 @@ FIRST_MEMORIES = (
 )  # intervals, of which the likeliest is where the search for the jerk begins
 LONGER = 2.5  # times, from memory to memory, up to as many mean intervals: in bunches the typical one is far too short
 UNFORESEEN = 8.0  # times the noise, of a prediction: with more, a reading says nothing of its own noise
-DOUBT = 3.0  # in log-likelihood, by which more noise may be less likely and is not excluded
 NOISE_STEP, NOISE_STEPS = 2.0, 6  # by which the noise is raised, and how often
 RATIO_BOUND = 6.0  # on |ln(vertical / horizontal jerk)|
 VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
@@ -154,7 +154,7 @@ def most_noise(log: Observations, model: Model, starts: list[Start], predicted_s
     doubtful = np.flatnonzero(np.array(foreseen) > UNFORESEEN * np.sqrt(model.noise_variance))
     if not doubtful.size:
         return None
-    least, most = likelihood_of(log, model, starts) - DOUBT, model.noise_variance.copy()
+    least, most = likelihood_of(log, model, starts) - odds.POSSIBLE, model.noise_variance.copy()
     for _ in range(NOISE_STEPS):
         before = most.copy()
         for c in doubtful:

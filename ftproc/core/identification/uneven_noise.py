@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core import pacing
+from ftproc.core import odds, pacing
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
@@ -22,7 +22,7 @@ from ftproc.order_statistics import median, medians
 from ftproc.records import FloatArray
 
 TAILS = 4.0  # degrees of freedom of the distribution that outliers move little
-LEAST_GAIN, SHARE = 15.0, 0.07  # in log-likelihood, and for each sample, for late stamps to be accepted
+SHARE = 0.07  # in log-likelihood, for each sample, for late stamps to be accepted
 STAMP_TAILS, STAMP_ROUNDS = 2.0, 100  # degrees of freedom of how late the stamps are: a few, by very much
 STAMP_SCALES = np.logspace(-2, 8, 101)  # of the usual variance of a stamp, for integrals over it
 STEPS = 30
@@ -84,7 +84,7 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     plain, _ = likeliest(without, np.r_[first[:3] - 12.0, without[3]])
     tries = [likeliest(first - np.r_[0.0, 0.0, 0.0, less], first - 35.0) for less in (0.0, 4.0)]
     best, found = min(tries, key=lambda each: each[0])
-    late = plain - best > max(LEAST_GAIN, SHARE * len(used))
+    late = plain - best > max(odds.MANY, SHARE * len(used))
     late = late and math.exp(found[3]) < median(np.diff(log.time_s)) ** 2  # else they would not be in order
     return np.exp(found[:3]), math.exp(found[3]) if late else 0.0
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core import beside
+from ftproc.core import beside, odds
 from ftproc.core.filtering.beside import GATE
 from ftproc.core.filtering.records import Model, Observations, Scalars, Start
 from ftproc.core.filtering.smoother import residuals_beside
@@ -45,7 +45,7 @@ def learned(log: Observations, model: Model, starts: list[Start], rate: FloatArr
     if channel.why or channel.told < beside.USEFUL:
         return Rates(), np.zeros(len(rate))
     both = log._replace(beside=(channel.rates,))
-    hinder = beside.of_the_rest(both, model, starts) < beside.of_the_rest(log, model, starts) - beside.CONTRADICTS
+    hinder = beside.of_the_rest(both, model, starts) < beside.of_the_rest(log, model, starts) - odds.SURE
     if hinder or beside.lateness(both, model, starts)[0] != 0:
         return Rates(), np.zeros(len(rate))
     return Rates(-1.0 if channel.closing else 1.0, channel.noise, True), channel.rates.weight

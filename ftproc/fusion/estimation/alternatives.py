@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
@@ -24,7 +25,7 @@ from ftproc.fusion.estimation.intervals import Channel, Search
 from ftproc.records import FloatArray, IntArray
 
 TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained
-ROUNDS, FINALISTS, BETTER = 3, 3, 6.0  # of decisions; hypotheses that get them; in log-probability, to be taken
+ROUNDS, FINALISTS = 3, 3  # of decisions; hypotheses that get them
 IDLE = 6  # of decisions on the same readings, while a flight is continued
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
 MOST_LIVE = 10  # components whose pairs and triples are tried; of more the majority decides
@@ -125,7 +126,7 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     typical = ways[0].model
     ways += [Steps(near, typical._replace(jerk=times * typical.jerk), search) for times in MANOEUVRES]
     standing = max(way.of(now)[0].likelihood for way in ways)
-    return best.weight if best.likelihood > standing + BETTER else None
+    return best.weight if best.likelihood > standing - odds.FAULT else None
 
 
 def _tense(near: Neighbourhood, typical: Model) -> bool:

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ftproc.core import beside as understanding
+from ftproc.core import odds
 from ftproc.core.components import bounded
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import beside as layout
@@ -220,7 +221,7 @@ def _fitted(current: Flight, s: int, j: int, gate: float, smoothed: Callable[[Fl
     def likelier(found: Flight, without: Flight) -> Flight:
         of_both = (understanding.of_the_rest(each.log, each.model, [each.start], kind) for each in (found, without))
         with_them, alone = of_both
-        return without if with_them < alone - understanding.CONTRADICTS else found
+        return without if with_them < alone - odds.SURE else found
 
     now = Scalars(side.value, np.full(len(side.value), side.sigma**2), side.weight)
     if side.name == HEIGHT:

@@ -17,8 +17,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting.curves import CLOCK
-from ftproc.core.editing.lasting.scanned import MARGIN, PRIOR
 from ftproc.core.editing.patch_likelihood import log_probability_of_all
 from ftproc.core.identification.motions.motion_models import ONLY_WHITE, WHITE, Candidates
 from ftproc.core.identification.profile import roughness
@@ -85,7 +85,7 @@ def _with_own_heights(readings: Readings, settle: Settle) -> tuple[Readings, Cur
         stations[s] = stations[s]._replace(prior=prior)
         with contextlib.suppress(Alone):
             found = settle(readings._replace(stations=stations))
-            if score(found) > score(current) + (MARGIN if current is first else 0.0):
+            if score(found) > score(current) + (odds.SURE if current is first else 0.0):
                 current = found
     return readings._replace(stations=current.stations), current
 
@@ -95,7 +95,7 @@ def _without_largest_jumps(readings: Readings, current: Current, settle: Settle)
     for _ in range(LASTING_ROUNDS):
         if not (_contradict(current) or _rejects_many(current)):
             break
-        least = score(current) + MARGIN - PRIOR + math.log(len(current.events.time_s))
+        least = score(current) + odds.SURE - odds.FAULT + math.log(len(current.events.time_s))
         agree = _others_that_agree(readings, settle)
         tried = _without_jumps(readings, current, agree, settle)
         s, jump, first = max(tried, key=lambda each: score(each[2]), default=(0, None, current))
@@ -172,7 +172,7 @@ def _without_jumps(
         with contextlib.suppress(Alone):
             jumps = jumps_beside.propose(station, current.own[s], others.events.time_s, others.found.run.state)
             likeliest = max(jumps, key=lambda jump: jump.gain, default=None)
-            if likeliest is not None and likeliest.gain > MARGIN:
+            if likeliest is not None and likeliest.gain > odds.SURE:
                 for jump in likeliest.sides():
                     yield s, jump, settle(_without(readings, s, jump))
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
-from ftproc.core.editing.lasting.scanned import MARGIN
 from ftproc.core.editing.lasting.search import search
 from ftproc.core.editing.lasting.weighing import Found, Scene, late_of, with_even_runs
 from ftproc.core.filtering.records import Model, Observations
@@ -98,7 +98,7 @@ def find(decided: Decided, gate: float, jerk_known: bool, work: Work) -> list[Fo
         log, possible, taken_in, setting, at_median, jerk_known, decided.rates, gate, decided.residual, decided.state,
         decided.sigma, work=work,
     )  # fmt: skip
-    return [each for each in search(scene) if each.gain > MARGIN]
+    return [each for each in search(scene) if each.gain > odds.SURE]
 
 
 def taken_out(readings: Readings, events: Events, found: Sequence[Found]) -> Readings:

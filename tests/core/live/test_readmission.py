@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.scales import scales_of
@@ -31,7 +32,7 @@ def case(rejected, patch=slice(0), components=(0,), sigmas=15.0):
 def readmitted(open_):
     """The decisions taken instead, with the process noise as it is."""
     found = readmission.readmitted(open_, open_.model, None)
-    return None if found is None or found.gain <= readmission.MARGIN else found.case.log.weight
+    return None if found is None or found.gain <= odds.LIKELIER else found.case.log.weight
 
 
 @pytest.mark.parametrize("components", [(0,), (2,), (0, 1), (0, 1, 2)])

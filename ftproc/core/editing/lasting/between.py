@@ -18,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.scanned import FOLLOWED, MARGIN, MOST_EACH, Scanned, in_whole, weighed_on, worth
+from ftproc.core.editing.lasting.scanned import Scanned, in_whole, weighed_on, worth
 from ftproc.core.editing.lasting.screen import ELEVATED, leaves_curves, may_leave_curves, others_as_usual
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.profile import pieces
@@ -195,7 +196,7 @@ def likeliest_followed(seen: Scanned) -> Found | None:
             if stretches in waves:
                 first = of_many_terms(part, ends[0], partial(without, *span, False))
             else:
-                first = of_few_terms(part, ends, FOLLOWED, seen.prior(ends[0]), partial(without, *span, False))
+                first = of_few_terms(part, ends, odds.ONE_END, seen.prior(ends[0]), partial(without, *span, False))
             if first is None:
                 continue
             runs = [curve for each in stretches for curve in each.runs()]
@@ -205,8 +206,8 @@ def likeliest_followed(seen: Scanned) -> Found | None:
             if stretches in waves:  # motion may be as agile
                 null = max(null, as_it_is(part, part.log.weight, best.model), key=_likelihood)
             gain = best.log_probability - null.log_probability + seen.prior(best.curves)
-            least = MARGIN if stretches in waves else FOLLOWED
-            if least < gain < MOST_EACH * part.possible.sum():
+            least = odds.SURE if stretches in waves else odds.ONE_END
+            if least < gain < odds.PERFECT * part.possible.sum():
                 found.append(Found(in_whole(best, near, n), best.sigma, gain))
     return max(found, key=lambda each: each.gain, default=None)
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting import scan
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.weighing import Scene
@@ -17,7 +18,6 @@ from ftproc.records import FloatArray, IntArray
 Channels = Sequence[tuple[int, int]]
 
 SPANS, APART, MOST_SPANS = 2, 3, 4  # stretches on either side of a jump, cells between them, and all that are weighed
-PER_TERM = 5.0  # in log-likelihood, for a scan to prefer a stretch of more terms
 TERMS = (1, 2, 3, 5)
 LONGEST, FARTHEST = 0.5, 5000  # of the log, and samples: what is off for longer is off for good
 LONGEST_AT_END = 0.3  # of the log, at one of its ends: on one side alone a longer curve may as well be motion
@@ -87,7 +87,7 @@ def _likeliest_spans(gain: FloatArray, edges: IntArray, sample: int) -> list[tup
     sample; gain: see `scan.gains`."""
     k, found = int(np.searchsorted(edges, sample)), list[tuple[float, bool, int]]()
     for more, side in itertools.product((False, True), (slice(1, max(k - 1, 1)), slice(k + 2, len(edges) - 1))):
-        along = _from(gain[int(more)], k) - PER_TERM * more * (scan.TERMS - 1)
+        along = _from(gain[int(more)], k) - odds.LIKELIER * more * (scan.TERMS - 1)
         found += [(float(along[j]), more, int(edges[j])) for j in _peaks(along, side)]
     return [(more, edge) for _, more, edge in sorted(found, reverse=True)[:MOST_SPANS]]
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting import clock, scan
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import CELLS, LONGEST, cell_of
@@ -27,10 +28,6 @@ OF_EACH = 30  # readings of each component on each side of what is weighed
 SHORTEST_CELL = 2  # samples in a cell of a scan
 REMEMBERED, SHORT = 2.5, 0.12  # samples that a filter remembers: with fewer, a long curve may as well be the target's
 # motion, and this share of the log is the longest
-PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
-STAYS = -4.0  # log-odds of a step that stays or a clock that jumps, to a patch: where one begins slowly is uncertain
-MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
-FOLLOWED = 25.0  # the same of a patch that motion explains but for its ends: turns gain 18 without one
 
 
 class End(NamedTuple):
@@ -71,7 +68,7 @@ class Scanned(NamedTuple):
         of the rejected runs, as often as these are."""
         n, length = self.samples, curves[0].length
         stays = curves[0].begin == 0 or curves[0].end == n
-        seldom = PRIOR - math.log(n) * (1 if stays else 2)
+        seldom = odds.FAULT - math.log(n) * (1 if stays else 2)
         like_it = self.runs[2 * self.runs >= length]
         if stays or not len(like_it):
             return seldom - math.log(3)

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting import scan
 from ftproc.core.editing.lasting.clock import gain_at_a_gap
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, columns_of
@@ -26,8 +27,6 @@ from ftproc.core.identification.profile import median_level, pieces
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
-LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 where there is no step, from 7 on where
-# there is; with the median of the log, from 13 on
 ELEVATED = 30.0  # times the usual process noise
 HIDDEN = 25.0  # the same by the typical process noise of the part, where it may have grown for the jump: turns 20
 
@@ -45,11 +44,11 @@ def left_of(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) 
 
     def leaves(way: tuple[int, ...]) -> bool:
         taken_in = _with_rejected(part, way, jump.station, around, without.weight)
-        if _is_more_than(LEFT, part, partial(gain, way), without, taken_in):
+        if _is_more_than(-odds.FAULT, part, partial(gain, way), without, taken_in):
             return True
         if len(without.model.jerk) > 1 and gain(way, part.log, median_level(without.model)) > HIDDEN:
             return True
-        return way == (CLOCK,) and gain_at_a_gap(part, around[0], without.weight, without.model) > LEFT
+        return way == (CLOCK,) and gain_at_a_gap(part, around[0], without.weight, without.model) > -odds.FAULT
 
     left = [way for way in jump.ways if leaves(way)]
     return jump._replace(ways=tuple(way for way in jump.ways if way in left or (left and way == (CLOCK,))))
@@ -68,8 +67,8 @@ def may_leave_curves(part: Scene, few: Sequence[Curve], most: Sequence[Curve], l
     than is typical."""
     weight = part.log.weight
     by_median, decided = (as_it_is(part, weight, model) for model in (part.at_median, part.own or part.at_median))
-    if not leaves_curves(part, few, LEFT, decided):
-        least = max(least, LEFT + decided.log_probability - by_median.log_probability)
+    if not leaves_curves(part, few, -odds.FAULT, decided):
+        least = max(least, decided.log_probability - by_median.log_probability - odds.FAULT)
     return leaves_curves(part, most, least, by_median)
 
 
@@ -90,7 +89,7 @@ def others_as_usual(part: Scene, curves: Sequence[Curve]) -> bool:
     log = part.log._replace(weight=weight)
     starts = part.starts(log)
     typical = likelihood_of(log, own._replace(jerk=jerk), starts)
-    return typical > likelihood_of(log, own, starts) - LEFT
+    return typical > likelihood_of(log, own, starts) + odds.FAULT
 
 
 def _gain(part: Scene, curves: Sequence[Curve], log: Observations, model: Model) -> float:

@@ -14,30 +14,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.editing.lasting.between import likeliest_followed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.ends import around, by_itself, instead_of
 from ftproc.core.editing.lasting.proposals import SHORTEST, LocatedJump, exactly, other_end, proposals, steps
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import (
-    DOUBT,
-    MARGIN,
-    MOST_EACH,
-    PRIOR,
-    STAYS,
     Scanned,
     in_whole,
     scanned,
     weighed_on,
     worth,
 )
-from ftproc.core.editing.lasting.screen import LEFT, left_of
+from ftproc.core.editing.lasting.screen import left_of
 from ftproc.core.editing.lasting.weighing import Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.profile import median_level
 
 ROUNDS = 8  # over a log
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a fault of several
-OPEN = 12.0  # in log-probability, within which a jump may be one or another: beside agile targets it tells little
 
 
 def search(scene: Scene) -> list[Found]:
@@ -78,7 +73,7 @@ def _odds_of(found: Sequence[Found], seen: Scanned, *others: Found) -> float:
     near = seen.near(min(edges), max(edges))
     with contextlib.suppress(ValueError, np.linalg.LinAlgError):
         likely = weighed_on(seen.scene.part(near), near, [curve.of(len(curve.size)) for curve in curves])
-        return likely.log_probability + sum(seen.prior(each.curves) + STAYS * each.stays(n) for each in found)
+        return likely.log_probability + sum(seen.prior(each.curves) + odds.STAYS * each.stays(n) for each in found)
     return -math.inf
 
 
@@ -103,11 +98,11 @@ def _joined(seen: Scanned, found: Sequence[Found], new: Found) -> list[Found]:
             continue
         best = max(together, key=lambda of: of.log_probability)
         gain = best.log_probability - without.log_probability  # its ends are those of what is known
-        if gain > (STAYS if stays else MARGIN - PRIOR):
+        if gain > (odds.STAYS if stays else odds.SURE - odds.FAULT):
             whole = zip(in_whole(best, near, n), best.sigma, strict=True)
             sized = {curve.begin: ((curve,), (sigma,)) for curve, sigma in whole}
             kept = [of._replace(curves=sized[of.curves[0].begin][0], sigma=sized[of.curves[0].begin][1]) for of in kept]
-            filled = Found(*sized[middle.begin], gain + (new.gain if stays else PRIOR), (new,) if stays else ())
+            filled = Found(*sized[middle.begin], gain + (new.gain if stays else odds.FAULT), (new,) if stays else ())
             return [*found[:k], *found[k + 1 :], *kept, filled]
     return [*found, new]
 
@@ -168,7 +163,7 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     moves = [curve.component for curve in _moving(step.curves, step.sigma)]
     if 0 < len(moves) < len(step.curves):
         gain, located, step = max((gain, located, step), _as_step(seen, jump, moves, null), key=lambda each: each[0])
-    if not DOUBT <= gain < MOST_EACH * seen.scene.possible[near].sum() or not 0 < located.sample < n:
+    if not odds.FAULT <= gain < odds.PERFECT * seen.scene.possible[near].sum() or not 0 < located.sample < n:
         return None
     if located.channels[0][0] == CLOCK:
         return Found(in_whole(step, near, n), step.sigma, gain)
@@ -179,7 +174,7 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     whole, alone = seen.near(min(ends), max(ends)), around(seen, located.sample)
     if whole.stop - whole.start > alone.stop - alone.start:
         end = by_itself(seen, located.channels, located.sample)
-        if end.short is not None and end.odds(seen.prior(in_whole(step, near, n))) > OPEN:
+        if end.short is not None and end.odds(seen.prior(in_whole(step, near, n))) > odds.OPEN:
             return end.short
     best = _best(seen, proposed, whole, located)
     short = None if best is None else instead_of(seen, best)
@@ -193,7 +188,7 @@ def _left_as_steps(seen: Scanned, jump: Jump) -> Jump:
     part = typical.scene.part(seen.near(jump.sample, jump.sample))
     null = max(weighed(part, weight, ()).log_probability for weight in (part.log.weight, part.taken_in))
     steps = ((way, _as_step(typical, jump, way, null)[2]) for way in jump.ways)
-    return jump._replace(ways=tuple(way for way, step in steps if step.log_probability > null + LEFT))
+    return jump._replace(ways=tuple(way for way, step in steps if step.log_probability > null - odds.FAULT))
 
 
 def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tuple[float, LocatedJump, Weighed]:
@@ -221,16 +216,16 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
         gain = found.log_probability - null + seen.prior(curves)
         return Found(in_whole(found, here, n), found.sigma, gain)
 
-    def odds(of: Found) -> float:
-        return of.gain + STAYS * of.stays(n)
+    def standing(of: Found) -> float:
+        return of.gain + odds.STAYS * of.stays(n)
 
     outcomes = [outcome(curves) for curves in proposed]
-    best = max(outcomes, key=odds)
-    if not DOUBT <= best.gain < MOST_EACH * part.possible.sum():
+    best = max(outcomes, key=standing)
+    if not odds.FAULT <= best.gain < odds.PERFECT * part.possible.sum():
         return None
     moves = _moving(best.curves, best.sigma)
     if 0 < len(moves) < len(best.curves):
-        best = max(best, outcome(moves), key=odds)
+        best = max(best, outcome(moves), key=standing)
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
         one = best.curves[0]
         other, at = (one.begin if one.end == located.sample else one.end), located.sample - here.start
@@ -238,8 +233,8 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
         ends = {"begin": min(located.sample, edge), "end": max(located.sample, edge)}
         if ends["end"] - ends["begin"] >= SHORTEST:
             sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])
-            best = max(best, sharper, key=odds)
-    nearly = sorted((each for each in outcomes if each.gain > best.gain - OPEN), key=_gain)
+            best = max(best, sharper, key=standing)
+    nearly = sorted((each for each in outcomes if each.gain > best.gain - odds.OPEN), key=_gain)
     likeliest = {each.lies(located.sample, n): each for each in nearly}
     likeliest.pop(best.lies(located.sample, n), None)
     return best._replace(others=tuple(likeliest.values()))

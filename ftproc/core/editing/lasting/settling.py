@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.faults import MOTION, PATCH, STEP, Rival, Step, levelled, taken_out, unseen
 from ftproc.core.editing.lasting.proposals import near_end
-from ftproc.core.editing.lasting.scanned import MARGIN
 from ftproc.core.editing.lasting.search import search
 from ftproc.core.editing.lasting.weighing import Found, Scene, scene_of
 from ftproc.core.editing.reassessment import log_probability
@@ -24,17 +24,10 @@ from ftproc.core.work import Work
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
-MOVES = 15.0  # in log-probability, before half of a log is moved
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
-STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
-LOST = 90.0  # in log-probability, for each reading that is left out, beyond what goes with it
-AGILE, COSTS = (
-    4.0,
-    3.0,
-)  # times the process noise, and that for each reading: with both a track is lost in the end; true
-# patches of half a minute cost up to 6, in the angles of agile targets, but the target does not seem more agile
+AGILE = 4.0  # times the process noise: where what is left asks for more, and for too many readings, the track is lost
 LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out, another may show
 
 
@@ -77,7 +70,7 @@ def without_lasting(
             found = _without(before, other := _hidden_by_drift(before, work), search(other), measurement, decided)
         if found.record is before.record:
             return found if best.record is before.record else _with_rival(best, found, told)
-        if not (_process_noise(found) > AGILE * _process_noise(best) and _is_lost(best, found, COSTS)):
+        if not (_process_noise(found) > AGILE * _process_noise(best) and _is_lost(best, found, odds.COSTS)):
             best = found
     return best if best is found else _with_rival(best, found, told)
 
@@ -135,7 +128,7 @@ def _without(
         return found
     rivals, probability = [*settled, *new.rivals], log_probability(*other)
     without = Understood(*other, steps, banned, new.doubtful, rivals, scene, probability, first)
-    return found if new.banned.any() and _is_lost(found, without, LOST) else without
+    return found if new.banned.any() and _is_lost(found, without, odds.LOST) else without
 
 
 def _is_lost(before: Understood, without: Understood, each: float) -> bool:
@@ -156,7 +149,7 @@ def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Re
     record, decision = without
     possible = record.possible & levelled_log[0].possible  # of the same readings
     same = record._replace(possible=possible), decision._replace(weight=decision.weight * possible)
-    return log_probability(*levelled_log) < log_probability(*same) + STEP_MARGIN
+    return log_probability(*levelled_log) < log_probability(*same) + odds.SURE
 
 
 class SortedOut(NamedTuple):
@@ -176,9 +169,9 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
     for each in found:
         for curve, sigma in zip(each.curves, each.sigma, strict=True):
             is_level = curve.end == n and len(curve.size) == 1
-            other_target = len(each.curves) == CLOCK and each.gain > MOVES * CLOCK  # no encoder or mount
+            other_target = len(each.curves) == CLOCK and each.gain > odds.MANY * CLOCK  # no encoder or mount
             if not is_level or other_target or min(curve.begin, n - curve.begin) < near_end(n):
-                if curve.component != CLOCK and each.gain > MARGIN:
+                if curve.component != CLOCK and each.gain > odds.SURE:
                     side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
                     result.banned[side, curve.component] = True
                     result.rivals.extend(_rivals(each, curve._replace(begin=side.start, end=side.stop), PATCH, None, n))
@@ -189,7 +182,7 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
                 continue
             else:
                 large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
-            sure = bool(large and each.gain > MOVES)
+            sure = bool(large and each.gain > odds.MANY)
             step = Step(curve.component, curve.begin, curve.size[0], sigma, sure)
             (result.steps if step.sure else result.doubtful).append(step)
             result.rivals.extend(_rivals(each, curve, STEP if step.sure else MOTION, step, n))

@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from ftproc.core import odds
 from ftproc.core.filtering.columns import Columns, said_of
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import likelihood_of, smooth_log
@@ -27,7 +28,6 @@ BESIDE_KNOTS = 5  # of the profile on each side of a peak, in which the two are 
 VARIANCES = 10.0 ** np.arange(-2, 9)  # m2/s4 of a change, along each axis
 PLACES = 24  # of a change that are tried in a peak
 LEAST_SHARE = 0.01  # of its variance, that an interval has
-SURE = 8.0  # in log-likelihood, by which a change explains the readings better
 MOST_CHANGES = 3  # at a peak: a motor that is lit and burns out
 STEPS = 3  # of the search for a profile
 
@@ -78,7 +78,7 @@ def _at_peak(log: Observations, start: Start, peaked: Model, level: Model, place
         return found
     least = climbed(log, [start], peaked, STEPS, scales)[1]
     for _ in range(MOST_CHANGES):
-        likelihood = climbed(log, [start], level._replace(jolts=found + change), STEPS, scales)[1] - SURE
+        likelihood = climbed(log, [start], level._replace(jolts=found + change), STEPS, scales)[1] - odds.SURE
         if likelihood < least:
             break
         found, least = found + change, likelihood

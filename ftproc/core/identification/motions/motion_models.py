@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Scalars, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
 from ftproc.core.identification import decimation
@@ -33,9 +34,7 @@ MODELS = {
 }
 NOTHING = np.zeros(3, bool)
 STEPS, LONG_STEPS = 3, 10  # of the search for a profile; where it falls by powers of ten once a motor is out
-MARGIN = jolts.SURE  # in log-likelihood, by which a model must explain a log better than white jerk does: with less,
-# the luck of a single flight decides which is the better one
-CLOSE = 2 * MARGIN  # with less, white jerk is as good as another model, or that as good as white jerk
+CLOSE = 2 * odds.SURE  # with less, white jerk is as good as another model, or that as good as white jerk
 FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
 MOST_STEPS = 100  # in a gap
 LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less of it, that may be ballistic
@@ -125,7 +124,7 @@ def choose(
     if with_changes is None:
         return found
     other = _chosen(log, starts, with_changes, among, known)
-    return other if other.log_probability() > found.log_probability() + jolts.SURE else found
+    return other if other.log_probability() > found.log_probability() + odds.SURE else found
 
 
 def _chosen(
@@ -136,7 +135,7 @@ def _chosen(
     fitted, short, course = _fitted(log, starts, white, others, known)
     best = max(fitted, key=lambda each: _finite(each.gain))
     other = Chosen(WHITE, white, best.gain, log, starts, white)
-    if best.gain > MARGIN or WHITE not in names:
+    if best.gain > odds.SURE or WHITE not in names:
         found = _about_its_track(best, log, short, course, white)
         return found._replace(rival=other if WHITE in names and best.gain < CLOSE else None)
     rival = _about_its_track(best, log, short, course, white, again=False) if best.gain > 0 else None
@@ -214,7 +213,7 @@ def _steered(short: Logged, model: Model, base: float) -> tuple[Model, float]:
     """The likeliest profile from this one on, with its allowance, and the likelihood. Where that is beyond a base, the
     acceleration along the path may fade."""
     model, likelihood = climbed(*short[:2], model, STEPS, short.scales)
-    if _finite(likelihood) > base + MARGIN:
+    if _finite(likelihood) > base + odds.SURE:
         faded = _fading(short, model)
         if faded.motion.fades > 0:
             model, likelihood = climbed(*short[:2], faded, STEPS, short.scales)
@@ -226,7 +225,7 @@ def _fading(short: Logged, model: Model) -> Model:
     else what is saved is the doubt about an acceleration that has soon faded anyway."""
     heads = smooth_log(short.log, model, short.starts).heads
     starts = [_settled(*each) for each in zip(short.starts, heads, strict=True)]
-    found, least = model, likelihood_of(short.log, model, starts) + MARGIN
+    found, least = model, likelihood_of(short.log, model, starts) + odds.SURE
     for fades in FADING:
         faded = model._replace(motion=model.motion._replace(fades=fades))
         likelihood = _finite(likelihood_of(short.log, faded, starts))

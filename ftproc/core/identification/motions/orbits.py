@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import likelihood_of, score_log, smooth_log
 from ftproc.core.identification import optimizer
@@ -34,7 +35,6 @@ NEAR = 1e-4  # of the range: from a course farther away gravity is not followed 
 # ranges are read in a later half of its pass is 5 to 20 % off)
 STEPS, ROUNDS, TURNS = 12, 20, 16  # of the search for noise and jerk; of both searches; of that for the rotation
 SETTLED = 0.1  # in log-likelihood, that both searches gain
-HOPELESS = 200.0  # in log-likelihood: a still earth that is so far behind is no start (a satellite's is ahead, by 65)
 NARROWER = 0.5  # times the angle of a turn, after one that leads nowhere
 FARTHEST = 12.0, 25.0  # ln of times: less noise variance, and less jerk, than white jerk leaves
 
@@ -67,7 +67,7 @@ def fit(track: Track, model: Model, rival: float = -math.inf) -> tuple[Model, fl
     """The likeliest noise, jerk and rotation of the earth, from the noise and the jerk of a model and the course about
     which it is linearised on, and the log-likelihood. rival: that of another motion; far from it no more is tried."""
     still = _settled(track, median_level(model)._replace(motion=Motion(acts=True).about(model.motion.course)))
-    if (likelihood := track.likelihood(still)) < rival - HOPELESS:
+    if (likelihood := track.likelihood(still)) < rival - odds.HOPELESS:
         return still, likelihood
 
     def turning(earth: FloatArray, times: float) -> Model:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.editing import patch_likelihood
 from ftproc.core.editing.lasting.curves import Curve, Fitted, Setting, columns_of, fitted
 from ftproc.core.editing.lasting.faults import Shift, allowing
@@ -27,8 +28,6 @@ from ftproc.core.model.frames import line_of_sight_axes, wrap
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray
 
-LIKELIER = 3.0  # and the margin, by which a jump must be likelier than that the track has followed a patch: steps are
-# by 10 and more, where walks off the track end up to 6
 WELL = 3.0  # sigmas of the noise, as 1-sigma of a jump that is taken out (tracks that followed a patch: up to 286)
 NEARLY = 0.5  # of what the readings were off, within which they are back (another target that moves: 5.9 to 2.0 m)
 JUMPED, BACK = 4, 2  # readings in a row that show it
@@ -63,7 +62,7 @@ def likeliest(case: Open) -> tuple[Open, float] | None:
                     [*_well_known(case, c, _nearly_back(case, c, together, *_jumped(case, c, together)))],
                     list(_earlier_patches(case, c, run)),
                 )
-                tried += [*_over(jump, patches, LIKELIER), *_over(patches, jump)]
+                tried += [*_over(jump, patches, odds.POSSIBLE), *_over(patches, jump)]
     found = [(_with_others(case, other), gain) for other, gain in tried if math.isfinite(gain)]
     return max(found, key=lambda each: each[1], default=None)
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
@@ -25,7 +26,6 @@ from ftproc.records import FloatArray
 KEPT = ("possible", "level", "level_sigma")
 ROUNDS = 3  # of smoothing and deciding
 MOVES_STEPS = 6  # of the search for the process noise of a target that begins to move
-MARGIN = 5.0  # by which the log-probability of other decisions must be better
 
 
 class Open(NamedTuple):
@@ -75,7 +75,7 @@ def readmitted(case: Open, profile: Model, scales: Scales | None) -> Other | Non
     found = [log_probability(case, weight) for weight in tried]
     best = int(np.argmax(found))
     other = Other(case._replace(log=case.log._replace(weight=tried[best])), profile, found[best] - found[0])
-    if other.gain > MARGIN or scales is None:
+    if other.gain > odds.LIKELIER or scales is None:
         return other
     weight = case.log.weight.copy()
     for c, run in runs.items():

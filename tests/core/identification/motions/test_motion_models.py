@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
+from ftproc.core import odds
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
@@ -109,7 +110,7 @@ def test_a_flight_of_white_jerk_stays_one(seed):
     model, log = fitted(a), a.log
     found = choose(log, a.starts, model, Candidates(tuple(MODELS)))
     assert found.name == WHITE
-    assert found.gain < motion_models.MARGIN
+    assert found.gain < odds.SURE
     assert found.model is model
     assert found.log is log
     assert found.row is None
@@ -138,7 +139,7 @@ def test_sigmas_allow_for_a_rival(monkeypatch):
     """They reach half the way to where it puts the target, where that is far."""
     flight = simulate("manoeuvre-clean", seed=1)
     (alone, turns), sigma = (pipeline.filter_log(flight.log, replace(SMOOTH, motion=m)) for m in MOTIONS_TRIED), []
-    for margin in (motion_models.MARGIN, np.inf):
+    for margin in (odds.SURE, np.inf):
         monkeypatch.setattr(motion_models, "MARGIN", margin)
         monkeypatch.setattr(motion_models, "CLOSE", 2 * margin)
         sigma.append(pipeline.filter_log(flight.log, SMOOTH).sigma[:, :3])

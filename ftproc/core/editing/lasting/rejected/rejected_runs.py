@@ -14,6 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.between import PER_TERM, TERMS, of_any_shape
@@ -21,7 +22,6 @@ from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.faults import MOTION, PATCH, Rival
 from ftproc.core.editing.lasting.rejected.followed import followed, with_weight
 from ftproc.core.editing.lasting.rejected.joining import LENGTHS, SHORTEST, Run, rejected_runs
-from ftproc.core.editing.lasting.scanned import FOLLOWED
 from ftproc.core.editing.lasting.weighing import scene_of, weighed
 from ftproc.core.editing.reassessment import (
     COMPARED_STEPS,
@@ -38,9 +38,6 @@ from ftproc.core.identification.profile import median_level
 from ftproc.core.work import Work
 from ftproc.records import FloatArray
 
-SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than patches; within which either may be
-MARGIN = 6.0  # in log-probability, by which other decisions must be better: on 25 manoeuvring flights none of 18 that
-# were better by more was worse in truth, of 12 that were better by less 7
 AGILE = 100.0  # times the median process noise, where the search for that of motion which begins at once begins, too
 ROUNDS, REPEATS = 2, 3  # over a log, whose runs may have changed; of deciding
 WEIGHED = 10  # times that the samples around a run are weighed, about
@@ -74,7 +71,7 @@ def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[D
             if gain > 0:
                 weight[near] = best
             changed = np.flatnonzero(best[:, run.component] != own.weight[:, run.component])
-            if abs(gain) < OPEN and len(changed) >= SHORTEST and _apart(part, own, best):
+            if abs(gain) < odds.LIKELIER and len(changed) >= SHORTEST and _apart(part, own, best):
                 begin, end = int(changed[0]) + near.start, int(changed[-1]) + 1 + near.start
                 taken_in = bool(best[changed, run.component].mean() > 0.5)
                 ways = (MOTION, PATCH) if taken_in == (gain > 0) else (PATCH, MOTION)
@@ -106,7 +103,7 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
                 other = _decided(part, decision._replace(weight=way), unfollowed, here, decided)
             if other.tobytes() not in found:
                 moves = run.moves(before, other, offset)
-                prior = SELDOM * (1 + len(run.beside)) if moves and (run.beside or not follows) else -MARGIN
+                prior = odds.MOTION * (1 + len(run.beside)) if moves and (run.beside or not follows) else odds.FAULT
                 found_so = with_weight(part, decision, other)
                 gain = log_probability(part, found_so) - as_before() + prior
                 if moves and run.beside:
@@ -116,7 +113,7 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     for other in followed(part, decision, run, offset, unfollowed) if run.joins else ():
         if other.tobytes() not in found:
             found_so = with_weight(part, decision, other)
-            found[other.tobytes()] = log_probability(part, found_so) - as_before() - MARGIN, other
+            found[other.tobytes()] = log_probability(part, found_so) - as_before() + odds.FAULT, other
     del found[before.tobytes()]
     gain, other = max(found.values(), key=lambda each: each[0], default=(-np.inf, before))
     return other, gain
@@ -134,7 +131,7 @@ def _more_than_a_curve(part: Record, decision: Decision, other: FloatArray, run:
         curve = of_any_shape(scene, weighed(scene, taken_in, [Curve(run.component, begin, end, (0.0,) * most)]))
     except (ValueError, np.linalg.LinAlgError):
         return np.inf
-    return motion.log_probability + FOLLOWED - curve.log_probability
+    return motion.log_probability + odds.ONE_END - curve.log_probability
 
 
 def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[tuple[FloatArray, bool]]:
