@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 import re
 from collections.abc import Sequence
 
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.words import QUANTITIES
+
+#: Columns without a name above them: the name that they get -> how the rows begin.
+_UNNAMED = {
+    "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
+    "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
+}
+#: What may stand behind the last name and in no row: a separator, or a name of comments, as LabVIEW writes them.
+_LAST_OF_NAMES = ("", "comment", "comments", "remark", "remarks", "note", "notes")
 
 
 def joined_brackets(line: str) -> list[str]:
@@ -85,3 +94,38 @@ def middles(block: Sequence[str], width: int) -> list[float]:
     spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
     spans = [row for row in spans if len(row) == width]
     return [sum(low + high for low, high in column) / (2 * len(spans)) for column in zip(*spans, strict=True)]
+
+
+def of_width(names: list[str], rows: Sequence[Sequence[str]], block: Sequence[str]) -> list[str] | None:
+    """As many names as there are cells in each row; empty ones where all cells are, and for what stands without a name
+    before the others."""
+    width, empty = len(rows[0]), [not any(column) for column in zip(*rows, strict=False)]
+    spare = width - len(names)
+    if spare == 0:
+        return names
+    if spare == -1 and names[-1].lower() in _LAST_OF_NAMES:
+        return names[:-1]
+    if spare > 0 and all(empty[-spare:]):
+        return [*names, *[""] * spare]
+    if spare > 0 and all(empty[:spare]):
+        return [*[""] * spare, *names]
+    first = next((name for name, pattern in _UNNAMED.items() if block and _begin_with(block, pattern)), "")
+    if spare == 1 and not first and known(names) > 1 and _are_numbered(rows, names):
+        first = "row"
+    return [first, *names] if spare == 1 and first else None
+
+
+def _begin_with(block: Sequence[str], pattern: str) -> bool:
+    """Whether all rows begin so."""
+    return all(re.match(pattern, row) for row in block)
+
+
+def _are_numbered(rows: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
+    """Whether the first cells count the rows, and are not themselves the time that the first name may be that of."""
+    first, second = ([cells[k].strip('" ') for cells in rows] for k in (0, 1))
+    if not all(cell.isdecimal() for cell in first) or {int(b) - int(a) for a, b in itertools.pairwise(first)} != {1}:
+        return False
+    numbers = [float(cell) for cell in second if re.fullmatch(r"\d+(?:\.\d+)?", cell)]
+    steps = [later - before for before, later in itertools.pairwise(numbers)]
+    evenly = bool(steps) and 0 < max(steps) < 1.001 * min(steps) + 1e-6
+    return not taken_apart(names[0]).means("time") or evenly or not numbers

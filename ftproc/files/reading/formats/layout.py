@@ -38,13 +38,6 @@ _WITH_BLANKS = re.compile(
 _LONGEST_HEADING = 20_000  # characters of a line that is taken apart in several ways
 _LONGEST_CELL = 200  # characters of a number or a time
 RULE = re.compile(r"(?=[+*#|,;:\s]*+(?:[-=_][+*#|,;:\s]++)*+[-=_]{2})[-=_+*#|,;:\s]*+")
-#: Columns without a name above them: the name that they get -> how the rows begin.
-_UNNAMED = {
-    "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
-    "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
-}
-#: What may stand behind the last name and in no row: a separator, or a name of comments, as LabVIEW writes them.
-_LAST_OF_NAMES = ("", "comment", "comments", "remark", "remarks", "note", "notes")
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
 _CALLED = re.compile(
     r"^\s*(?:columns?|fields?|names?|header)\s*[:=]\s*", re.IGNORECASE
@@ -83,6 +76,7 @@ def find(lines: Sequence[str], widths: Sequence[int] = ()) -> Layout | None:
     most = max(length for _, length, _ in tables.values())
     separator = next(s for s, (_, length, _) in tables.items() if length >= _ENOUGH * most)
     start, _, rows = tables[separator]
+    start = _first(lines, filled, start, separator, rows, widths)
     return _with_names(lines, filled, start, separator, rows, widths)
 
 
@@ -139,6 +133,26 @@ def _longest(filled: Sequence[int], rows: dict[int, list[str]], between: Sequenc
         if length > best[1]:
             best = (start, length)
     return best
+
+
+def _first(
+    lines: Sequence[str], filled: Sequence[int], start: int, separator: str, rows: dict[int, list[str]],
+    widths: Sequence[int],
+) -> int:  # fmt: skip
+    """Index in `filled` of the first row under the names, where other lines than comments stand between rows: of more
+    rows under the same names, or under none of their own, those before are the beginning."""
+    width, block = len(rows[filled[start]]), [lines[number] for number in filled[start : start + 50]]
+    names, top = list[str](), start
+    for index in range(start - 1, -1, -1):
+        if is_data(rows[filled[index]]):
+            continue
+        found = _heading(lines[filled[index]], separator, width, block, widths) or []
+        if headings.known(found) > 1:
+            if names and found != names:
+                break
+            names, top = found, index
+    above = next((index for index in range(top + 1, start) if is_data(rows[filled[index]])), start)
+    return above if len(rows[filled[above]]) == width else start
 
 
 def is_comment(text: str) -> bool:
@@ -246,42 +260,7 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
     ways = [way for way in ways if len(groups) < 2 or headings.known(way) >= headings.known(groups)]
     (ways if separator == BLANKS else others).append(groups)
     rows = [split(row, separator, widths) for row in block]
-    found = [_of_width(way, rows, block if separator == BLANKS else ()) for way in ways]
-    more = [_of_width(way, rows, ()) for way in others]
+    found = [headings.of_width(way, rows, block if separator == BLANKS else ()) for way in ways]
+    more = [headings.of_width(way, rows, ()) for way in others]
     found += [names for names in more if names and (headings.known(names) > 1 or are_units(names))]
     return max(filter(None, found), key=headings.known, default=None)
-
-
-def _of_width(names: list[str], rows: Sequence[Sequence[str]], block: Sequence[str]) -> list[str] | None:
-    """As many names as there are cells in each row; empty ones where all cells are, and for what stands without a name
-    before the others."""
-    width, empty = len(rows[0]), [not any(column) for column in zip(*rows, strict=False)]
-    spare = width - len(names)
-    if spare == 0:
-        return names
-    if spare == -1 and names[-1].lower() in _LAST_OF_NAMES:
-        return names[:-1]
-    if spare > 0 and all(empty[-spare:]):
-        return [*names, *[""] * spare]
-    if spare > 0 and all(empty[:spare]):
-        return [*[""] * spare, *names]
-    first = next((name for name, pattern in _UNNAMED.items() if block and _begin_with(block, pattern)), "")
-    if spare == 1 and not first and headings.known(names) > 1 and _are_numbered(rows, names):
-        first = "row"
-    return [first, *names] if spare == 1 and first else None
-
-
-def _begin_with(block: Sequence[str], pattern: str) -> bool:
-    """Whether all rows begin so."""
-    return all(re.match(pattern, row) for row in block)
-
-
-def _are_numbered(rows: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
-    """Whether the first cells count the rows, and are not themselves the time that the first name may be that of."""
-    first, second = ([cells[k].strip('" ') for cells in rows] for k in (0, 1))
-    if not all(cell.isdecimal() for cell in first) or {int(b) - int(a) for a, b in itertools.pairwise(first)} != {1}:
-        return False
-    numbers = [float(cell) for cell in second if re.fullmatch(r"\d+(?:\.\d+)?", cell)]
-    steps = [later - before for before, later in itertools.pairwise(numbers)]
-    evenly = bool(steps) and 0 < max(steps) < 1.001 * min(steps) + 1e-6
-    return not taken_apart(names[0]).means("time") or evenly or not numbers

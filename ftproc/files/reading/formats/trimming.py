@@ -31,7 +31,7 @@ _SUMS = frozenset(
 )
 _COUNTED = re.compile(r"\W*\d[\d,.]*\s+(rows?|records?|lines?|samples?|points?|entries|zeilen)\b.*", re.IGNORECASE)
 _FEW = 0.2  # of the lines, that may be words among the rows
-_LETTERS = np.arange(ord("a"), ord("z") + 1)
+_LETTERS, _MARKING = np.arange(ord("a"), ord("z") + 1), np.frombuffer(b'*-;"=_', np.uint8)
 _UNDER = 3  # lines under repeated names, at most, such as units and a rule
 _LAST = 4096  # bytes in which the last line is sought
 _ALIKE, _MOST_ALIKE = 1 << 16, 500  # bytes and lines before a cut line that show what its cells should be
@@ -161,11 +161,12 @@ def _end(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[in
 
 
 def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> list[tuple[int, int]]:
-    """Where lines of words stand among the rows, such as `*** LOST TRACK ***`, if they are few."""
+    """Where lines of words and rules stand among the rows, such as `*** LOST TRACK ***`, if they are few."""
     if widths or len(names) < 2:
         return []
     letters = np.frombuffer(whole, np.uint8)
-    if not len(letters) or letters.max() < ord("A"):  # digits and marks only
+    ruled = any(b"\n" + mark in whole for mark in (b"--", b"==", b"__"))
+    if not len(letters) or (letters.max() < ord("A") and not ruled):  # digits and marks only
         return []
     starts = np.flatnonzero(letters == ord("\n")) + 1
     begins = starts[starts < len(letters)]
@@ -173,7 +174,7 @@ def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Seque
         filled = np.flatnonzero(letters != ord(" "))
         begins = filled[np.searchsorted(filled[:-1], begins)]
     first = letters[begins]
-    odd = starts[: len(first)][np.isin(first | 0x20, _LETTERS) | (first == ord("*")) | (first == ord("-"))]
+    odd = starts[: len(first)][np.isin(first | 0x20, _LETTERS) | np.isin(first, _MARKING)]
     if not 0 < len(odd) <= _FEW * len(starts):
         return []
     found = []
@@ -183,14 +184,13 @@ def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Seque
         text = line[1].decode("utf-8", "replace")
         cells = layout.split(text, separator)
         other = len(cells) != len(names) or (separator == layout.BLANKS and not re.search(r"\d|nan", text, re.I))
-        if other and not layout.is_data(cells) and re.match(r"[\W_]*[^\W\d_]{2}", text):
+        words = re.match(r"[\W_]*[^\W\d_]{2}", text) or layout.RULE.fullmatch(text)
+        if other and not layout.is_data(cells) and words:
             found.append((start, line.end()))
     return found
 
 
-def _is_row(
-    line: bytes, names: Sequence[str], separator: str, widths: Sequence[int], whole: bool = False
-) -> bool:  # fmt: skip
+def _is_row(line: bytes, names: Sequence[str], separator: str, widths: Sequence[int], whole: bool = False) -> bool:
     """Whether a line is a row; unless `whole`, its first cell may be bad and begin as comments do, such as #VALUE!."""
     cells = layout.split(line.decode("utf-8", "replace").strip(), separator, widths)
     return len(cells) == len(names) and layout.is_data(cells if whole else cells[1:])

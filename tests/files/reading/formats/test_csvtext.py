@@ -137,3 +137,15 @@ def test_names_that_come_again_and_comments_cost_no_row(make: Make, place: int, 
     rows = [f"{k},{1000 + k},0.5,0.25\n" for k in range(40)]
     log = logs.read(make(HEADER + "".join([*rows[:place], stands, *rows[place:]])))
     assert log.time_s.tolist() == list(range(40))
+
+
+@pytest.mark.parametrize("between", ["Flight 12, continued\n\n{names}\n", "; lost lock\n", '"lost lock"\n', "=====\n"])
+@pytest.mark.parametrize("row", [5, 100, 150])
+def test_lines_among_the_rows_below_a_title_lose_none(tmp_path: Path, between: str, row: int) -> None:
+    names = "Time (s),Range (m),Azimuth (deg),Elevation (deg)"
+    rows = [f"{k / 10},{5000 + 3 * k},{30 + 0.05 * k},12\n" for k in range(250)]
+    text = f"Flight 12\n\n{names}\n{''.join(rows[:row])}{between.format(names=names)}{''.join(rows[row:])}"
+    (tmp_path / "a.csv").write_text(text)
+    log = logs.read(tmp_path / "a.csv")
+    np.testing.assert_allclose(log.time_s, np.arange(250) / 10)
+    np.testing.assert_allclose(log.measurement[:, 0], 5000 + 3 * np.arange(250))
