@@ -67,7 +67,7 @@ def _variables(path: Path, room: Room) -> tuple[Mapping[str, Any], Mapping[str, 
     with netcdf_file(path, mmap=True) as file:
         room.check(sum(each.data.nbytes for each in file.variables.values() if vectors.is_vector(each.data.shape)))
         copied = {
-            key: (np.array(each.data), vectors.word(getattr(each, "units", "")))
+            key: (vectors.unpacked(np.array(each.data), vars(each).get), vectors.word(getattr(each, "units", "")))
             for key, each in file.variables.items()
             if vectors.is_vector(each.data.shape)
         }

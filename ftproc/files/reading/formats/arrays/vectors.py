@@ -17,6 +17,7 @@ _FEWEST = 2  # arrays that make a table
 _MOST_COLUMNS = 64  # of a matrix
 _KINDS = "iufSUO"  # of numpy's types: numbers and texts
 _SINCE = re.compile(r"(\w+) since (\d{4}-\d{1,2}-\d{1,2})(?:[T ](\d{1,2}:\d{2}(?::\d{2}(?:\.\d+)?)?))?\D*")
+_PACKING = "scale_factor", "add_offset", "_FillValue", "missing_value"
 _LAST_S = 2.0**62 / 1e6  # of 64-bit microseconds
 
 
@@ -126,6 +127,25 @@ def word(value: Any) -> str:
     if isinstance(value, np.ndarray | np.generic) and value.size == 1:
         value = value.item()
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value if isinstance(value, str) else ""
+
+
+def unpacked(values: Any, attribute: Callable[[str], Any]) -> Any:
+    """Numbers as the CF conventions pack them, with a factor, an offset, and a number that stands for none."""
+    if values.dtype.kind not in "iuf":
+        return values
+    factor, offset, *empty = (_number(attribute(key)) for key in _PACKING)
+    if factor is None and offset is None and not any(np.any(values == each) for each in empty if each is not None):
+        return values
+    found = np.asarray(values, float) * (1.0 if factor is None else factor) + (offset or 0.0)
+    for each in empty:
+        found[values == each] = np.nan
+    return found
+
+
+def _number(value: Any) -> float | None:
+    """The number that an attribute is, or None."""
+    value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else None
 
 
 def _since(unit: str) -> tuple[Unit, np.datetime64] | None:
