@@ -34,6 +34,11 @@ def log(tmp_path: Path) -> Log:
         ("# two-way range", "ranges there and back. If these are such, say --columns range=range_m --units", "range=m"),
         ("# vertical angle is a zenith distance", "say --elevation-from zenith; if not, --elevation-from horizon", ""),
         ("# azimuth counted from south", "zero_deg = 180 under [azimuth]", "north"),
+        ("# Azimut ab Süd", "zero_deg = 180 under [azimuth]", "north"),
+        ("# Entfernungen: Hin- und Rückweg", "ranges there and back", "range=m"),
+        ("# All ranges are horizontal distances", "speaks of horizontal distances", "range=m"),
+        ("# multiply range by 10", "speaks of a factor or an offset", "range=m"),
+        ("# elevation is positive down", "naming the column Depression; if not, --elevation-from horizon", ""),
     ],
 )
 def test_a_line_above_the_table_is_heard(log: Log, line: str, sentence: str, otherwise: str) -> None:
@@ -49,6 +54,8 @@ def test_a_line_above_the_table_is_heard(log: Log, line: str, sentence: str, oth
 @pytest.mark.parametrize(
     ("head", "sentence"),
     [
+        ("Time (s),Horizontaldistanz (m),Az (deg),El (deg)", "is a horizontal distance, and ranges are slant ones"),
+        ("Time (s),水平距离(m),Az (deg),El (deg)", "is a horizontal distance, and ranges are slant ones"),
         ("Time (s),HD (m),Az (deg),El (deg)", '"HD (m)" is a horizontal distance, and ranges are slant ones'),
         ("Time (s),Range gate,Az (deg),El (deg)", '"Range gate" may be the range as numbers of range gates'),
         ("Time (s),Bin,Az (deg),El (deg)", "--columns range=Bin --units range=UNIT, where UNIT is the length of one"),
@@ -63,10 +70,65 @@ def test_what_is_no_slant_range_is_not_left_out_without_a_word(log: Log, head: s
     assert sentence in str(question.value)
 
 
+@pytest.mark.parametrize(
+    ("range_", "sentence"),
+    [
+        ("Range (m; two-way)", 'the name of column "Range (m; two-way)" speaks of ranges there and back'),
+        ("Range*10 (m)", "holds a factor, \"*10\". Say what one is worth, such as --units 'range=0.1 m'"),
+        ("Range/10 (m)", 'holds a factor, "/10"'),
+        ("Range (half km)", "such as --units 'range=0.1 km', or --units range=km if nothing is to be multiplied"),
+    ],
+)
+def test_a_name_that_says_more_than_the_unit_is_asked_about(log: Log, range_: str, sentence: str) -> None:
+    path = log(f"Time (s),{range_},Az (deg),El (deg)")
+    with pytest.raises(InputError) as question:
+        logs.read(path)
+    assert sentence in str(question.value)
+    assert len(logs.read(path, units={"range": "km" if "km" in range_ else "m"})) == 60
+
+
+@pytest.mark.parametrize("name", ["El (deg, positive down)", "Elevation (deg; + down)", "Tiefenwinkel (deg)"])
+def test_angles_that_are_said_to_count_downwards_are_turned_round(log: Log, name: str) -> None:
+    up, down = (logs.read(log(f"Time (s),Range (m),Az (deg),{each}")) for each in ("El (deg)", name))
+    np.testing.assert_allclose(down.measurement[:, 2], -up.measurement[:, 2])
+    assert any("counts downwards and is turned round" in remark for remark in down.remarks)
+
+
+@pytest.mark.parametrize(("name", "assumed"), [("Range (m; slant)", []), ("Range (m; squashed)", ["m; squashed"])])
+def test_words_that_are_not_understood_are_a_condition(log: Log, name: str, assumed: list[str]) -> None:
+    path = log(f"Time (s),{name},Az (deg),El (deg)")
+    words = [f'"{each}" in the name of column "{name}" changes nothing' for each in assumed]
+    assert logs.read(path).understood["assumed"] == words
+
+
 def test_times_that_are_all_the_same_are_refused(log: Log) -> None:
     path = log("Date,Lap,range_m,azimuth_deg,elevation_deg", "".join(f"2024-05-14,{row}\n" for row in ROWS.split()))
     with pytest.raises(InputError, match=r'all 60 rows have the same time in "Date".*Lap'):
         logs.read(path)
+
+
+def test_times_whose_fractions_lack_their_zeros(log: Log) -> None:
+    rows = [f"10:00:{k // 20:02d}.{50 * (k % 20)},{9000 + 2 * k},{30 + 0.01 * k},10" for k in range(200)]
+    read = logs.read(log("Time,Range (m),Az (deg),El (deg)", "\n".join(rows) + "\n"))
+    np.testing.assert_allclose(np.diff(read.time_s), 0.05, atol=1e-9)
+    assert any("without their leading zeros" in remark for remark in read.remarks)
+
+
+@pytest.mark.parametrize("fractions", [["0", "5", "05", "50"], ["1", "2", "3", "4"], ["100", "200", "350", "400"]])
+def test_other_fractions_are_as_they_are(log: Log, fractions: list[str]) -> None:
+    rows = [f"10:00:{k // 4:02d}.{fractions[k % 4]},{9000 + 2 * k},{30 + 0.01 * k},10" for k in range(80)]
+    read = logs.read(log("Time,Range (m),Az (deg),El (deg)", "\n".join(rows) + "\n"))
+    expected = sorted(36000 + k // 4 + float(f"0.{fractions[k % 4]}") for k in range(80))
+    np.testing.assert_allclose(read.time_s, expected, atol=1e-9)
+
+
+def test_bad_rows_are_left_out_and_not_taken_for_a_target(log: Log) -> None:
+    rows = "".join(f"{k},{9000 + 40 * k + 3000 * (k % 3 == 0)},{30 + 5 * (k % 3 == 0)},10,{'OK' if k % 3 else 'BAD'}\n"
+                   for k in range(90))  # fmt: skip
+    with pytest.raises(
+        InputError, match=r"calls OK are of another track than the others \(BAD\)\. Say --where Status=OK"
+    ):
+        logs.read(log("Time (s),Range (m),Az (deg),El (deg),Status", rows))
 
 
 def test_units_that_change_from_row_to_row_are_named(log: Log) -> None:
