@@ -26,6 +26,7 @@ FLOORS = (
         "core.processes",
         "core.pacing",
         "core.work",
+        "core.odds",
     ),
     ("core.compiled",),
     ("core.model",),

@@ -123,7 +123,7 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "elevation": _split(
         """
         v h ele vertikalwinkel verticalangle vertangle vangle va elv alt altitude site sito situ depression
-        depressionangle ум ε
+        depressionangle dipangle tiefenwinkel lookdownangle downangle ум ε
         """
     ),
 }
@@ -163,7 +163,7 @@ ZENITH_ALIASES = _split(
 )
 
 #: Names of angles below the horizontal.
-DEPRESSIONS = ("depression", "depressionangle")
+DEPRESSIONS = ("depression", "depressionangle", "dip", "dipangle", "tiefenwinkel", "lookdownangle", "downangle")
 
 #: Words of an azimuth that counts from true north, beside `true`.
 TRUE = frozenset(
@@ -272,6 +272,21 @@ MISSING_WORDS = (
 )
 
 _LETTERS = str.maketrans({"ł": "l", "ı": "i", "ø": "o", "đ": "d", "æ": "ae", "ß": "ss"})  # that have no parts
+
+
+#: Words in brackets behind a name that change nothing, beside units and what the name itself may say.
+HARMLESS = frozenset(
+    _split(
+        """
+    above after and angle anti anticlockwise at azimuth bearing by ccw clockwise counter counterclockwise cw day
+    dd decimal deg degrees distance double e east elapsed elevation epoch float from geodetic geographic gmt gps
+    grid hh horizon horizontal in int integer itow launch local los lst midnight mm mod modulo ms n nominal
+    north of one oneway or over positive posix range real relative sec seconds since single sl slant slope sod
+    ss start tai the time to tod tow unit units unix unwrapped up upward upwards ut utc way week wgs with
+    wrapped x yy yyyy z zero
+    """
+    )
+).union(QUALIFIERS, CORRECTED, ZENITH_ALIASES, *(words for words, _, _ in TURNED.values()))
 
 
 def plain_letters(text: str) -> str:

@@ -11,7 +11,7 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.further import HEIGHT, Further
-from ftproc.files.reading.meaning import bearings
+from ftproc.files.reading.meaning import wording
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.schema import Column
@@ -130,6 +130,13 @@ def knows_axis(station: Station, found: Mapping[str, Column]) -> bool:
 
 
 def assumed_of(found: Mapping[str, Column]) -> list[str]:
+    """What must hold for names that say more than the program understands."""
+    unheard = {column.name: wording.unheard(column.name, q) for q, column in found.items() if len(column.roles) == 1}
+    words = [f'"{said}" in the name of column "{name}" changes nothing' for name, said in unheard.items() if said]
+    return words + _of_bearings(found)
+
+
+def _of_bearings(found: Mapping[str, Column]) -> list[str]:
     """What must hold for an azimuth whose name says that it counts from a direction which may change."""
     azimuth = found.get("azimuth")
     if azimuth is None:
@@ -137,7 +144,7 @@ def assumed_of(found: Mapping[str, Column]) -> list[str]:
     if "added" in azimuth.roles:
         added = azimuth.name.split(" + ")[azimuth.roles.index("added")]
         return [f'"{added}" is the heading of the carrier'] if COURSES & {*taken_apart(added).words} else []
-    turns = bearings.counts_from(taken_apart(azimuth.name))
+    turns = wording.counts_from(taken_apart(azimuth.name))
     counts = "may count" if azimuth.key == AT_SEA else "counts"
     return [f"{turns}, from which the azimuth {counts}, stays where it is"] if turns == next(iter(TURNED)) else []
 
@@ -145,9 +152,9 @@ def assumed_of(found: Mapping[str, Column]) -> list[str]:
 def _axis(found: Mapping[str, Column]) -> str:
     """The doubt about where azimuths count from."""
     azimuth = found.get("azimuth")
-    what = bearings.counts_from(taken_apart(azimuth.name)) if azimuth and azimuth.key != AT_SEA else ""
+    what = wording.counts_from(taken_apart(azimuth.name)) if azimuth and azimuth.key != AT_SEA else ""
     return f"the azimuth counts from {what}" if what else _AXIS
 
 
 def _is_from_north(azimuth: Column) -> bool:
-    return "added" in azimuth.roles or bearings.says_north(azimuth.name)
+    return "added" in azimuth.roles or wording.says_north(azimuth.name)

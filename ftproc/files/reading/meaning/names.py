@@ -42,6 +42,7 @@ _COUNTS = re.compile(
     r"|(?:ten|hundred|thousand|million)(?:th)?s?)\b",
     re.IGNORECASE,
 )
+_FUNCTION = re.compile(r"(?:sin|cos|tan|log|ln|sqrt)\s*\(", re.IGNORECASE)
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _EASTERN, _LONGEST_UNIT = "\u2e80", 4  # letters from here on stand before a unit without a blank; of its letters
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
@@ -58,7 +59,7 @@ _TIMES, _OF_UTC = ("time", "timestamp", "stamp", "t"), ("utc", "gmt")  # and wha
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 _DAYS = re.compile(r"[\s_.([-](mjd|jd|doy|excel)[)\]]?", re.IGNORECASE)  # the count of days in a name
 
-#: Units of other quantities, by which a column is known for something else.
+#: Units of other quantities.
 _FOREIGN = frozenset(
     [
         *("m/s", "mps", "km/h", "kmh", "kph", "kt", "kts", "kn", "knots", "ft/s", "fps", "deg/s", "dps", "rad/s"),
@@ -75,7 +76,6 @@ NOTATIONS = frozenset(
         *("t", "true"),  # from true north
     ]
 )
-
 
 #: Words beside that of the zenith.
 _VERTICAL = QUALIFIERS.union(ALIASES["elevation"], WEAK_ALIASES["elevation"]) - {"e", "alt", "altitude"}
@@ -155,8 +155,8 @@ def taken_apart(text: str, unit: str = "") -> Name:
         return Name(text, "", ())
     plain = compatible(text).strip().strip("\"'#%;!:").strip()
     plain = EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
-    if _is_a_clock(plain):
-        return Name(text, _squeezed(plain), (_squeezed(plain),))
+    if _is_a_clock(plain) or _FUNCTION.match(plain):
+        return Name(text, _squeezed(plain), (_squeezed(plain),), foreign=not _is_a_clock(plain))
     *_, days = None, *_DAYS.finditer(plain)
     plain = days[1] + plain[days.end() :] if days else plain
     found, notation, foreign = "", "", False

@@ -6,8 +6,8 @@ import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from ftproc.files.reading.meaning.bearings import turned
 from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.reading.meaning.wording import turned
 from ftproc.files.units import unit_named
 from ftproc.files.words import ALIASES, WEAK_ALIASES, ZENITH_ALIASES
 

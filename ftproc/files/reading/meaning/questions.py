@@ -9,8 +9,8 @@ from typing import NamedTuple
 from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning.bearings import counts_from, says_north
 from ftproc.files.reading.meaning.names import Name, taken_apart, units_unknown
+from ftproc.files.reading.meaning.wording import HORIZONTAL, counts_from, says_north
 from ftproc.files.units import LIGHT_MPS, UNITS, unit_named
 from ftproc.files.words import (
     ALIASES,
@@ -28,7 +28,6 @@ from ftproc.files.words import (
 _COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
 _FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
 _GATES = re.compile(r"(?:range)?(?:gate|bin|cell)s?(?:no|nr|num|number|index)?")  # whole stems
-_HORIZONTAL = frozenset(("hd", "horizontaldistance", "horizontalrange", "groundrange", "grounddistance", "hdist"))
 _BESIDE_V = {"range": "s", "azimuth": "h"}  # the slope distance and the horizontal angle of surveyors
 _MOST_WORDS = 6  # of a name that may number its target
 #: Words of NOT_UNITS with which a column may still be the quantity.
@@ -224,7 +223,7 @@ def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str)
     """Ask for the scale of readings that are counts of an encoder, numbers of range gates, or times of flight."""
     name, names, unit = apart[index], [each.text for each in apart], unit_named("time", apart[index].unit)
     words = {name.stem, *name.words, *re.findall(r"[^\W\d_]+", name.text.lower())}
-    if quantity == "range" and words & _HORIZONTAL:
+    if quantity == "range" and any(map(HORIZONTAL.fullmatch, words)):
         raise InputError(
             f'{source}: column "{name.text}" is a horizontal distance, and ranges are slant ones. Divide it by the '
             f"cosine of the elevation and name it a slant range, or say --columns range={ABSENT} to leave it out."

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from ftproc.errors import InputError, nearest
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning import bearings, parts, questions
+from ftproc.files.reading.meaning import parts, questions, wording
 from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.reading.meaning.questions import Propose, answer, listed
 from ftproc.files.units import Unit, si_unit, unit_named
@@ -148,9 +148,10 @@ class _Table(NamedTuple):
         chosen = (unit_named(quantity, unit) if unit else stated) or si_unit(quantity)
         if unit is None:
             questions.refuse_hours(self.source, name, quantity)
+            wording.refuse_factor(self.source, name, quantity)
         return Column(
             quantity, (position,), self.names[position], chosen, unit is not None, stated is not None,
-            key=name.stem if name.means(quantity) != 2 else name.core(),
+            key=wording.key_of(name.text, quantity, name.stem if name.means(quantity) != 2 else name.core()),
             notation=name.notation, why=why, others=tuple(others), zenith=quantity == "elevation" and name.is_zenith(),
         )  # fmt: skip
 
@@ -228,7 +229,7 @@ def _is_corrected(name: Name, quantity: str) -> bool:
 
 def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | None:
     names, canonical = table.names, CANONICAL[quantity]
-    free = bearings.preferred(table.apart, free) if quantity == "azimuth" else free
+    free = wording.preferred(table.apart, free) if quantity == "azimuth" else free
     fits = [index for index in free if table.apart[index].means(quantity) == 1]
     if any(names[index] == canonical for index in fits):
         fits = [index for index in fits if table.apart[index].unit]

@@ -24,6 +24,8 @@ MOST_TARGETS = 500
 _MOST_COLUMNS = 100  # that are searched
 _AGREE = 0.8  # of the jumps fall on changes of the column that tells targets apart
 
+_GOOD = ("ok", "good", "valid", "gut", "true", "locked", "lock", "normal", "pass", "passed")  # cells of good readings
+
 #: Words in the names of columns that number targets.
 WORDS = frozenset(
     (
@@ -55,6 +57,14 @@ def refuse(
     row = log.row if kept is None else kept[log.row]
     column = column_of(log.measurement, _cells(header, free[:_MOST_COLUMNS], row)) if free else None
     if column is not None:
+        good = [value for value in column.values if value.lower() in _GOOD]
+        if good and not numbers_targets(column.name):
+            others = ", ".join(value for value in column.values if value not in good)
+            raise InputError(
+                f'{header.source}: the rows that column "{column.name}" calls {good[0]} are of another track than the '
+                f"others ({others}). Say --where {quoted(f'{column.name}={good[0]}')} to use only these, or --target "
+                "none to use all of them."
+            )
         first, count = column.values[0], len(column.values)
         shown = ", ".join(column.values[:6]) + (", ..." if count > 6 else "")
         raise InputError(

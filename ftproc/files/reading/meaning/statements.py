@@ -11,22 +11,31 @@ import numpy as np
 
 from ftproc.errors import InputError, quoted
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import parts
+from ftproc.files.reading.meaning import parts, wording
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import as_text, parsed
 from ftproc.files.reading.meaning.preamble import GROUPS
 from ftproc.files.reading.meaning.questions import answer, counts_frames, refuse_frames
 from ftproc.files.units import unit_named
-from ftproc.files.words import ALIASES, QUANTITIES
+from ftproc.files.words import ALIASES, DEPRESSIONS, QUANTITIES
 from ftproc.settings import Station
 
 _OF_UNITS, _VALUE = ("units", "unit", "uom", "einheit", "unité"), ("value", "val")  # how names of columns end
 #: What a line above the table may say -> the quantity that it is about, what that means, and the options that say it.
 _CONVENTIONS = (
-    (r"two[- ]?way|round[- ]?trip", "range", "ranges there and back", "--units 'range=0.5 m' (half of each)"),
+    (r"two[- ]?way|round[- ]?trip|there and back|\b2\s?R\b|hin-? und (?:her|rück)|aller[- ]?retour|andata e ritorno"
+     r"|ida y vuelta|往返", "range", "ranges there and back", "--units 'range=0.5 m' (half of each)"),
+    (r"(?:ranges?|distances?|entfernungen|strecken)\s+(?:(?:are|is|sind)\s+)?(?:horizontal\b(?! angle)|reduced to)"
+     r"|horizontal(?:ly)?[ _-]?(?:ranges?|distan\w+|entfernung)|ground ranges?\b", "range", "horizontal distances",
+     "--columns range=none, or divide them by the cosine of the elevation"),
+    (r"(?:range|dist)\w*\b.*\b(?:scale|factor|multipl\w+|divid\w+|offset)\b.*\d"
+     r"|\b(?:scale|factor|multipl\w+|divid\w+|offset)\b.*\b(?:range|distance)s?\b.*\d",
+     "range", "a factor or an offset", "--units 'range=10 m' (what one is worth), or the bias in a --config FILE"),
     (r"zenith(?:al)?[ -](?:distance|angle)", "elevation", "angles from the zenith", "--elevation-from zenith"),
-    (r"(?:from|zero at|counted from|south is zero) (?:the )?south\b", "azimuth", "azimuths from south",
-     "--config FILE with from = \"north\" and zero_deg = 180 under [azimuth] in it"),
+    (wording.DOWNWARD, "elevation", "angles below the horizontal", "so by naming the column Depression"),
+    (r"(?:from|zero(?: is)? (?:at|in|to(?:wards?)?)|zero\s*[:=]|counted from|\bab|\bvon|depuis(?: le)?|desde el)\s*"
+     r"(?:the )?(?:south|süd(?:en)?|sud|sur)\b|south is zero|\bS(?:outh)?\s*=\s*0\b|(?<![\w.])from S\b",
+     "azimuth", "azimuths from south", "--config FILE with from = \"north\" and zero_deg = 180 under [azimuth] in it"),
 )  # fmt: skip
 
 #: Words of lines that say what one count is worth; the worth of one, or of many.
@@ -148,19 +157,26 @@ def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, s
     names = [taken_apart(name) for name in header.names]
     settled = {
         "range": "range" in stated or not any(name.means("range") for name in names),
-        "elevation": station.elevation_from is not None or any(name.is_zenith() for name in names),
+        "elevation": station.elevation_from is not None
+        or any(name.is_zenith() or name.stem in DEPRESSIONS for name in names),
         "azimuth": station.azimuth_from is not None or station.azimuth_zero_rad != 0.0,
     }
     for pattern, quantity, what, say in _CONVENTIONS:
-        line = next((line for line in header.above if re.search(pattern, line, re.IGNORECASE)), None)
-        if line is not None and not settled[quantity]:
+        if settled[quantity]:
+            continue
+        mine = [(k, n.text) for k, n in enumerate(names) if n.means(quantity) or {*n.words} & {*ALIASES[quantity]}]
+        line = next((line for line in header.above if re.search(pattern, line, re.IGNORECASE)), "").strip()[:80]
+        where = f'a line above the table, "{line}",' if line else ""
+        if quantity != "elevation":  # whose names are heard
+            named = next((text for _, text in mine if re.search(pattern, text, re.IGNORECASE)), "")
+            where = where or (f'the name of column "{named}"' if named else "")
+        if where:
             if quantity == "range":
-                index = next((k for k, name in enumerate(header.names) if taken_apart(name).means("range")), 0)
-                say = f"{answer(header.names, {'range': index})} {say}"
-            otherwise = {"range": "range=m", "elevation": "--elevation-from horizon", "azimuth": "--azimuth-from north"}
+                say = say if say.startswith("--columns") else f"{answer(header.names, {'range': mine[0][0]})} {say}"
+            otherwise = {"range": "--units range=m", "elevation": "--elevation-from horizon",
+                         "azimuth": "--azimuth-from north"}[quantity]  # fmt: skip
             raise InputError(
-                f'{header.source}: a line above the table, "{line.strip()[:80]}", speaks of {what}. If these are such, '
-                f"say {say}; if not, {'--units ' if quantity == 'range' else ''}{otherwise[quantity]}."
+                f"{header.source}: {where} speaks of {what}. If these are such, say {say}; if not, {otherwise}."
             )
 
 
