@@ -32,6 +32,7 @@ LEAST, SHARE, TIMES_CHANCE = 8, 0.03, 3.0  # copies, of all readings, and of tho
 LEAST_ON_LINES = 0.15  # share of a component's readings
 NEARLY = 0.2  # of the median that the nearest twentieth of those off the lines are off: more shows rounding that is
 # coarse, whatever its step
+BENDS = 3  # in a row, which readings that are off make, and no lines from knot to knot
 ROUNDING = 1e-12  # of a number
 QUIET, IN_A_ROW = 0.05, 14  # of the noise, third differences that have none, and so many of them
 NOISE_SHARE, OF_NORMAL = 0.2, 0.2533  # share of third differences that gives the noise, and their limit in its 1-sigma
@@ -163,7 +164,10 @@ def _on_lines(
     off = np.abs(np.diff(slope)) * interval[:-1] * interval[1:] / (interval[:-1] + interval[1:])
     limit = 1.01 * step + ROUNDING * float(np.abs(values).max())
     flat = off <= limit
-    others = off[~flat]
+    knots = ~flat
+    for begin, end in runs_of(knots, BENDS):
+        knots[begin:end] = False
+    others = off[knots]
     if len(others) < FEWEST or typical(others) < MANY * limit or flat.sum() < LEAST_ON_LINES * len(values):
         return on, values
     if quantile(others, 0.05) > NEARLY * typical(others):

@@ -166,3 +166,14 @@ def test_the_rounding_shows_beside_a_reading_that_is_none(far):
     assert [rounding_step(channel) for channel in z[:, 1:].T] == pytest.approx([1e-6, 1e-6])
     _, kind = without_copies(TIME, z)
     assert not kind.any()
+
+
+@pytest.mark.parametrize("step", [1.5, 2.0, 3.0, 4.0])
+@pytest.mark.parametrize("share", [0.02, 0.05])
+def test_coarse_readings_among_outliers_are_no_lines(step, share):
+    """Whose rounding is coarser than their noise: nearly three in a row lie on a line, and outliers do not."""
+    draw, sigma = np.random.default_rng(8), np.array([2.0, 3e-4, 3e-4])
+    z = readings(6)
+    off = draw.random(z.shape) < share
+    z = np.round(np.where(off, z + draw.uniform(10, 100, z.shape) * sigma, z) / (step * sigma)) * step * sigma
+    assert (without_copies(TIME, z)[1] == INTERPOLATED).mean() < 0.01
