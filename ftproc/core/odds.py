@@ -7,6 +7,8 @@ FAULT = -6.0  # of a fault that lasts, or of a patch that was followed, at a jum
 STAYS = -4.0  # of a step that stays or a clock that jumps, to a patch: where one begins slowly is uncertain
 MOTION = 8.0  # of motion, to a patch, for rejected readings that leave the track and join it again without a jump
 
+START = 40.0  # nine numbers of a state, which a start takes from the readings themselves
+
 # Margins
 REFUTED = 0.5  # one standard deviation: by which a parameter may be less likely than its likeliest value
 POSSIBLE = 3.0  # a ratio of 20: what is less likely by no more is not excluded, what is likelier by more counts

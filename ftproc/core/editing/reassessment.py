@@ -20,12 +20,11 @@ from ftproc.core.components import any_of
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
 from ftproc.core.editing.runs import confirmed, suspicious
-from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.likelihood import NOISE_GROWTH, NOISE_SHRINKS
 from ftproc.core.identification.nearby import residuals_near, samples_around
-from ftproc.core.identification.profile import fit_profile, median_level, pieces, roughness
+from ftproc.core.identification.profile import fit_profile, median_level, pieces, roughness, starts_of
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.identification.stretches import runs_of, stretches_of, widened
 from ftproc.order_statistics import median
@@ -65,7 +64,7 @@ def reassess(record: Record, decision: Decision) -> Decision:
     for span in _doubtful(record, decision, at_median, list(_spans(around))):
         part = short_record(record, span)
         try:
-            starts = _starts(part, weight[span], at_median)
+            starts = starts_of(part.weighted(weight[span]), at_median)
         except ValueError:  # a component has too few readings there
             continue
         initial = Decision(weight[span], at_median, starts, decision.rates)
@@ -73,7 +72,7 @@ def reassess(record: Record, decision: Decision) -> Decision:
         weight[span] = decided.weight
         unexamined += decided.unexamined
     return decision._replace(
-        weight=weight, starts=_starts(record, weight, at_median), model=profile, unexamined=unexamined
+        weight=weight, starts=starts_of(record.weighted(weight), profile), model=profile, unexamined=unexamined
     )
 
 
@@ -108,10 +107,6 @@ def _doubtful(record: Record, decision: Decision, at_median: Model, spans: list[
 def with_profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS) -> Model:
     """The decision's model with a jerk profile."""
     return fit_profile(record.weighted(decision.weight), decision.starts, decision.model, steps)
-
-
-def _starts(record: Record, weight: FloatArray, at_median: Model) -> list[Start]:
-    return starts_of(record.weighted(weight), at_median)
 
 
 def _until_settled(record: Record, decision: Decision, profile: Model) -> Decision:
@@ -156,7 +151,7 @@ def _or_as_they_are(record: Record, again: Decision, tried: Decision, before: De
     where that is likelier: deciding with constant process noise may lead away from them."""
     if (tried.weight == before.weight).all():
         return again
-    tried = tried._replace(starts=_starts(record, tried.weight, median_level(before.model)))
+    tried = tried._replace(starts=starts_of(record.weighted(tried.weight), median_level(before.model)))
     return max(again, tried._replace(model=with_profile(record, tried)), key=partial(log_probability_as_it_is, record))
 
 
@@ -225,9 +220,8 @@ def log_probability(record: Record, decision: Decision) -> float:
 
 def log_probability_as_it_is(record: Record, decision: Decision) -> float:
     """Log-probability of all readings, of the decisions on them, of late time stamps and of the jerk profile."""
-    model, at_median = decision.model, median_level(decision.model)
-    log = record.weighted(decision.weight)
-    smoothed = smooth_log(log, model, _starts(record, decision.weight, at_median), RESIDUALS)
+    model, log = decision.model, record.weighted(decision.weight)
+    smoothed = smooth_log(log, model, starts_of(log, model), RESIDUALS)
     whole = alternatives.Neighbourhood(
         record.time_s, record.measurement, record.possible, model, decision.rates, record.gate, record.uneven
     )
@@ -272,7 +266,3 @@ def _suspects(
         near = residuals_near(without, profile, any_of(suspects), samples_around(log, at_median))
         suspects = confirmed(suspects, *near)
     return suspects
-
-
-def starts_of(log: Observations, model: Model) -> list[Start]:
-    return find_starts(log, model.noise_variance, float(median_level(model).jerk[0, 0]))

@@ -30,33 +30,31 @@ ONE_SECOND = 1.0  # in which a target may have passed its own range, if all its 
 
 
 def first_start(log: Observations, noise_variance: FloatArray) -> Start:
-    """The start of a log: at its first sample, or, where its position would be too poorly known there, where every
-    component has been seen once. Errors as in `first_state`."""
+    """The start of a log: at its first sample, or, where its position would be too uncertain, where each component was
+    seen. Errors as in `first_state`."""
     everything = slice(0, len(log.time_s))
     start = first_state(log, noise_variance, 0, everything)
-    if not _position_sigma(start) <= INFLATION * WIDEST_BRIDGE:
+    sigma_m, range_m = math.sqrt(np.trace(start.covariance[:3, :3])), float(np.linalg.norm(start.state[:3]))
+    if not sigma_m <= INFLATION * WIDEST_BRIDGE * max(range_m, NO_RANGE_M):
         seen = int(((log.weight > 0) & np.isfinite(log.measurement)).argmax(0).max())
         start = first_state(log, noise_variance, seen, everything) if seen > 0 else start
     return start
 
 
-def _position_sigma(start: Start) -> float:
-    """1-sigma of a start's position, in ranges."""
-    (x, y, z), covariance = start.state[:3].tolist(), start.covariance
-    return math.sqrt(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) / max(math.hypot(x, y, z), NO_RANGE_M)
-
-
-def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) -> list[Start]:
+def find_starts(
+    log: Observations, noise_variance: FloatArray, jerk_psd: float, profile: FloatArray | None = None
+) -> list[Start]:
     """The start of a log, and one more after every gap that is too long to bridge.
 
     A gap of G seconds is too long when the position has by its end become uncertain by a noticeable share of the range,
     sqrt(q G^5 / 20) > WIDEST_BRIDGE R: a filter that came through it would linearise about a wrong place. jerk_psd: q,
-    m^2/s^5. Errors as in `first_state`.
+    m^2/s^5; profile: (n,) the same at each sample: beside a gap between samples it counts if it is more.
     """
     time_s, measurement, weight = log[:3]
+    most = jerk_psd if profile is None else max(jerk_psd, float(profile.max()))
     starts = [first_start(log, noise_variance)]
     longest, shortest, nearest_m = _extremes(*(np.ascontiguousarray(each) for each in log[:3]))
-    bridged = not np.sqrt(jerk_psd * longest**5 / 20) > 0.99 * WIDEST_BRIDGE * nearest_m  # as every shorter gap is
+    bridged = not np.sqrt(most * longest**5 / 20) > 0.99 * WIDEST_BRIDGE * nearest_m  # as every shorter gap is
     if bridged or longest <= shortest_gap(shortest):  # so it is by the typical interval
         return starts
     longest_s = shortest_gap(typical(time_s[1:] - time_s[:-1]))
@@ -68,7 +66,10 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) 
     for low, high in itertools.pairwise(edges):
         if low <= starts[-1].sample or (good[low:high].sum(0) < FEWEST_READINGS).any():
             continue
-        if too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], jerk_psd):
+        level = jerk_psd
+        if profile is not None and gaps[low][1] == WIDEST_BRIDGE:
+            level = max(level, float(profile[low - 1 : low + 1].max()))
+        if too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], level):
             starts.append(first_state(log, noise_variance, low, slice(low, high)))
     return starts
 
@@ -184,9 +185,8 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
 
 @part
 def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, fit: Vector) -> float:
-    """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the
-    1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown
-    (infinite sigmas).
+    """The parabola through the chosen readings at the time of `sample`: value, rate and its change, and the 1-sigma
+    of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates have infinite sigmas.
 
     Readings on both sides of a manoeuvre lie on no parabola: then the farthest are left out, one by one. The scatter
     about it stands for what it misses of the motion, so it is not averaged down: it may hide a cubic, which grows away

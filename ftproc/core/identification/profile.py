@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, optimizer
@@ -114,6 +115,13 @@ def median_level(model: Model) -> Model:
     """The model with the median of its jerk profile for all of the flight."""
     level = median(model.jerk[:, 0])
     return model._replace(jerk=level * model.jerk[:1] / model.jerk[0, 0], knot_s=np.inf)
+
+
+def starts_of(log: Observations, model: Model, at_median: Model | None = None) -> list[Start]:
+    """Where a track starts over a log, by the process noise of its model, and by the typical one if that is another."""
+    profile = model.jerk[pieces(log.time_s, model), 0] if len(model.jerk) > 1 else None
+    typical = at_median or median_level(model)
+    return find_starts(log, typical.noise_variance, float(typical.jerk[0, 0]), profile)
 
 
 def from_knot(model: Model, time_s: FloatArray, span: slice) -> tuple[slice, Model]:

@@ -8,7 +8,7 @@ import pytest
 from ftproc.core.editing import reassessment, two_pass
 from ftproc.core.editing.lasting import settling
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification import nearby
+from ftproc.core.identification import nearby, profile
 from ftproc.core.identification.profile import median_level
 from tests.core.editing.test_two_pass import UNKNOWN, edit, flags
 from tests.simulated import simulate
@@ -141,7 +141,7 @@ def test_where_a_component_is_missing_around_what_is_marked_all_of_the_log_is_sm
     weight, marked = decision.weight.copy(), np.zeros(len(decision.weight), bool)
     weight[150:650, 1], marked[395:405] = 0.0, True
     residual, variance = nearby.residuals_near(record.weighted(weight), decision.model, marked, 200)
-    starts = reassessment._starts(record, weight, median_level(decision.model))
+    starts = profile.starts_of(record.weighted(weight), median_level(decision.model))
     whole = smooth_log(record.weighted(weight), decision.model, starts)
     np.testing.assert_array_equal(residual, whole.residual)
     np.testing.assert_array_equal(variance, whole.residual_variance)

@@ -235,6 +235,19 @@ def test_gaps_that_cannot_matter_are_not_looked_at(monkeypatch, missing):
     assert [0, 80] in found
 
 
+def test_the_process_noise_beside_a_gap_counts_if_it_is_more():
+    """That of the log does not say what an agile target may do in a gap of a turn; components that are blind for a
+    while, of which the decisions may change, go by that of the log."""
+    time, z, _ = interrupted(20.0)
+    level = np.full(len(time), 1e-3)
+    level[75:85] = 1e3
+    for most, starts in ((None, [0]), (level, [0, 80]), (np.roll(level, 40), [0]), (level / 1e9, [0])):
+        assert [start.sample for start in find_starts(log(time, z), NOISE, 1e-3, most)] == starts
+    time, z, _ = interrupted(0.1, n=300, after=100)
+    z[100:300, 1] = np.nan
+    assert len(find_starts(log(time, z), NOISE, 1e-3, np.full(len(time), 1e3))) == 1
+
+
 def test_too_few_readings_after_a_gap_are_no_start():
     time, z, _ = interrupted(300.0, after=5)
     assert len(find_starts(log(time, z), NOISE, 10.0)) == 1

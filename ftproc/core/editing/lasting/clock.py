@@ -61,6 +61,11 @@ def gaps(setting: Setting, most: int) -> list[Jump]:
     return [Jump(float(longer[k]), int(k) + 1, 0, ((CLOCK,),)) for k in largest if longer[k] > GAP]
 
 
+def leaves_gap(setting: Setting, sample: int, late_s: float) -> bool:
+    """Whether there is a gap before a sample, or an overlap like one, if the clock is late by so much from it on."""
+    return abs(gap_s(setting, sample) - late_s) > (GAP - 1) * setting.interval_s()
+
+
 def gain_at_a_gap(scene: Scene, sample: int, weight: FloatArray, model: Model) -> float:
     """How much likelier the scene is if the clock jumped in the gap before a sample."""
     late_s = gap_s(scene.setting, sample)

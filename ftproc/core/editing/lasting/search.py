@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ftproc.core import odds
+from ftproc.core.editing.lasting import clock
 from ftproc.core.editing.lasting.between import likeliest_followed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.ends import around, by_itself, instead_of
@@ -161,11 +162,15 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     null = max(each.log_probability for each in (without, weighed(part, part.taken_in, ())))
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
     moves = [curve.component for curve in _moving(step.curves, step.sigma)]
-    if 0 < len(moves) < len(step.curves):
+    if not moves:  # other decisions, from which it was weighed, explain what it gains
+        return None
+    if len(moves) < len(step.curves):
         gain, located, step = max((gain, located, step), _as_step(seen, jump, moves, null), key=lambda each: each[0])
     if not odds.FAULT <= gain < odds.PERFECT * seen.scene.possible[near].sum() or not 0 < located.sample < n:
         return None
     if located.channels[0][0] == CLOCK:
+        if jump.ways == ((CLOCK,),) and clock.leaves_gap(seen.scene.setting, located.sample, step.curves[0].size[0]):
+            return None  # motion in what is left of it explains as much
         return Found(in_whole(step, near, n), step.sigma, gain)
     proposed = list(proposals(seen.scene, located._replace(width=seen.cell, at_median=median_level(step.model))))
     if (CLOCK,) in jump.ways and len(part.rates) == 1:  # by the same part of the log

@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import odds
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Fitted, Setting, fitted, without
-from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.nearby import start_of_part
-from ftproc.core.identification.profile import fit_profile, median_level, of_part, roughness
+from ftproc.core.identification.profile import fit_profile, median_level, of_part, roughness, starts_of
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.identification.uneven_noise import rates
 from ftproc.core.model import stations
@@ -92,11 +92,11 @@ class Scene(NamedTuple):
         for s in range(len(self.rates)):
             yield s, np.flatnonzero(self.setting.station == s)
 
-    def starts(self, log: Observations) -> list[Start]:
-        """Where a filter over the log starts."""
+    def starts(self, log: Observations, model: Model | None = None) -> list[Start]:
+        """Where a filter over the log starts, by the process noise of a model, or by the median."""
         if self.track is not None and self.doubt is not None:
             return [start_of_part(self.track[0], self.doubt[0])]
-        return find_starts(log, self.at_median.noise_variance, float(self.at_median.jerk[0, 0]))
+        return starts_of(log, self.at_median if model is None else model, self.at_median)
 
 
 class Weighed(NamedTuple):
@@ -152,21 +152,21 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
         if not scene.fixed:
             level = fit_jerk(found.log, starts, scene.at_median)
             model = fit_profile(found.log, starts, level, PROFILE_STEPS)
-        smoothed = smooth_log(found.log, model, starts, RESIDUALS)
+        smoothed = smooth_log(found.log, model, scene.starts(found.log, model), RESIDUALS)
         before, weight = weight, _decided(scene, smoothed, model)
         settled = bool((weight == before).all())
         if settled:
             break
     if curves or not settled:
         found = _fitted(scene, scene.log._replace(weight=weight), model, known)
-        smoothed = smooth_log(found.log, model, scene.starts(found.log), RESIDUALS)
+        smoothed = smooth_log(found.log, model, scene.starts(found.log, model), RESIDUALS)
     return _understood(scene, found, smoothed, weight, model)
 
 
 def as_it_is(scene: Scene, weight: FloatArray, model: Model) -> Weighed:
     """The scene without curves, with these weights (n, 3) and by this model."""
     found = _fitted(scene, scene.log._replace(weight=weight), model, ())
-    smoothed = smooth_log(found.log, model, scene.starts(found.log), RESIDUALS)
+    smoothed = smooth_log(found.log, model, scene.starts(found.log, model), RESIDUALS)
     return _understood(scene, found, smoothed, weight, model)
 
 
@@ -174,6 +174,7 @@ def _understood(scene: Scene, found: Fitted, smoothed: SmootherRun, weight: Floa
     """The scene with fitted curves, weights (n, 3) and a model, and what is smoothed with them."""
     likely = found.log_probability if found.curves else smoothed.log_likelihood
     likely += _rejections(scene, weight, smoothed, model) - roughness(model)
+    likely -= odds.START * (len(scene.starts(found.log, model)) - 1)
     first = np.cumsum([0, *(len(curve.size) for curve in found.curves)])[:-1]
     sigma = np.sqrt(np.diag(found.covariance))[first] if found.curves else np.zeros(0)
     return Weighed(found.curves, tuple(sigma.tolist()), weight, model, likely)
@@ -191,7 +192,7 @@ def _fitted(scene: Scene, log: Observations, model: Model, curves: tuple[Curve, 
     """The curves with the likeliest sizes, if there are any."""
     if not curves:
         return Fitted((), log, 0.0, np.zeros((0, 0)))
-    starts = scene.starts(log._replace(measurement=without(log.measurement, scene.setting, curves)))
+    starts = scene.starts(log._replace(measurement=without(log.measurement, scene.setting, curves)), model)
     return fitted(log, model, starts, scene.setting, curves)
 
 

@@ -65,6 +65,8 @@ def test_gaps_are_the_intervals_of_several_others_and_the_jump_is_as_long():
     assert clock.gap_s(setting, 10) == 5.0
     assert clock.gap_s(setting, 11) == 0.0
     assert clock.gap_s(setting, 0) == 0.0
+    left = [clock.leaves_gap(setting, 10, late_s) for late_s in (5.0, 3.5, 6.5, 2.0, -1.0, 8.0)]
+    assert left == [False, False, False, True, True, True]
 
 
 def test_a_scene_is_put_in_the_order_of_the_times_without_the_jump():

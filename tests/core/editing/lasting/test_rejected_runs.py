@@ -3,10 +3,13 @@ the decisions say."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from ftproc import pipeline
+from ftproc.core import odds
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.rejected import followed, joining, rejected_runs
 from ftproc.core.editing.lasting.rejected.joining import LENGTHS, Run
@@ -68,7 +71,8 @@ def test_a_patch_that_was_followed_up_to_the_first_good_readings_behind_it(monke
 @pytest.mark.parametrize(("margin", "chosen"), [(43.0, "a patch of outliers"), (47.0, "motion")])
 def test_what_may_be_motion_or_a_patch_is_named(monkeypatch, margin, chosen):
     """That the ramp is a patch is likelier by 45: with a prior of about so much against it either may be."""
-    monkeypatch.setattr(rejected_runs, "MARGIN", margin)
+    others = SimpleNamespace(FAULT=-margin, MOTION=odds.MOTION, LIKELIER=odds.LIKELIER, ONE_END=odds.ONE_END)
+    monkeypatch.setattr(rejected_runs, "odds", others)
     flight = simulate("manoeuvre", seed=31, dt_s=0.1, duration_s=60.0)
     summary = pipeline.filter_log(flight.log, FilterSettings(smooth=True)).metadata["summary"]
     (rival,) = summary["rivals"]

@@ -11,9 +11,10 @@ import numpy as np
 
 from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.rejected.joining import SHORTEST, Run
-from ftproc.core.editing.reassessment import log_probability_as_it_is, starts_of
+from ftproc.core.editing.reassessment import log_probability_as_it_is
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.core.identification.profile import starts_of
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 

@@ -28,13 +28,12 @@ from ftproc.core.editing.reassessment import (
     PROFILE_STEPS,
     log_probability,
     short_record,
-    starts_of,
     with_profile,
 )
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.nearby import samples_around
-from ftproc.core.identification.profile import median_level
+from ftproc.core.identification.profile import median_level, starts_of
 from ftproc.core.work import Work
 from ftproc.records import FloatArray
 
