@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -129,7 +130,7 @@ def test_a_motion_that_is_about_as_likely_is_a_rival(monkeypatch):
     monkeypatch.setattr(motion_models, "CLOSE", np.inf)
     found = choose(a, starts, white, Candidates(names))
     assert (found.name, found.rival.name) == ("turning-force", WHITE)
-    monkeypatch.setattr(motion_models, "MARGIN", np.inf)
+    monkeypatch.setattr(motion_models, "odds", SimpleNamespace(SURE=np.inf))
     found = choose(a, starts, white, Candidates(names))
     assert (found.name, found.rival.name) == (WHITE, "turning-force")
     assert choose(a, starts, white, Candidates(("turning-force",))).rival is None
@@ -140,7 +141,7 @@ def test_sigmas_allow_for_a_rival(monkeypatch):
     flight = simulate("manoeuvre-clean", seed=1)
     (alone, turns), sigma = (pipeline.filter_log(flight.log, replace(SMOOTH, motion=m)) for m in MOTIONS_TRIED), []
     for margin in (odds.SURE, np.inf):
-        monkeypatch.setattr(motion_models, "MARGIN", margin)
+        monkeypatch.setattr(motion_models, "odds", SimpleNamespace(SURE=margin))
         monkeypatch.setattr(motion_models, "CLOSE", 2 * margin)
         sigma.append(pipeline.filter_log(flight.log, SMOOTH).sigma[:, :3])
     far = np.abs(alone.state[:, :3] - turns.state[:, :3])
