@@ -72,7 +72,7 @@ class Current(NamedTuple):
 
 
 class Alone(Exception):
-    """The readings of the stations determine no first track."""
+    """The readings of the stations determine no first track, or none that fits all of them."""
 
 
 def settled(
@@ -93,6 +93,8 @@ def settled(
         progress(number)
         level = number if number < FIRST_ROUNDS else None
         current = _round(current, trusted, gate, jerk_psd, level)
+        if not np.isfinite(current.found.run.state[current.start.sample :]).all():
+            raise Alone  # they contradict each other so much that the smoother diverges
         if number >= FIRST_ROUNDS - 1 and reassessed < REASSESSMENTS and (current.settled or number % 2):
             reassessed += 1
             current, changed = _reassessed(current, trusted, gate, search)
