@@ -108,6 +108,24 @@ def test_a_station_is_left_out_only_if_the_others_can_disagree():
     assert flight_faults._left_out(readings, {}) is None
 
 
+def test_a_station_is_at_a_wrong_place_if_without_it_alone_the_biases_are_probable():
+    """Decisively: by more than one station's biases and a fault cost, and more than without any other."""
+    stations = [SimpleNamespace(components=(1, 2))] * 4
+
+    def flown(*sizes):
+        return SimpleNamespace(constants=SimpleNamespace(estimate=np.array(sizes), prior=np.ones(len(sizes))))
+
+    readings, odd, probable = SimpleNamespace(stations=stations), flown(3.0, -3.0, 3.0, 3.0), flown(0.5, 0.5, 0.5)
+    less = flown(2.5, -2.5, 2.0)
+    assert flight_faults._surprise(odd) == 16.0
+    found = flight_faults._misplaced(readings, odd, {0: less, 1: probable, 2: less})
+    assert found == (1, probable)
+    assert flight_faults._misplaced(readings, odd, {0: probable, 1: probable}) is None
+    assert flight_faults._misplaced(readings, less, {1: probable}) is None
+    assert flight_faults._misplaced(readings, odd, {}) is None
+    assert flight_faults._misplaced(SimpleNamespace(stations=stations[:2]), odd, {1: probable}) is None
+
+
 def test_rejected_readings_ask_for_a_jump_only_where_many_lie_in_one_stretch():
     def rejects_many(rejected):
         weight = np.ones((1000, 3))

@@ -91,24 +91,45 @@ def _with_own_heights(readings: Readings, settle: Settle) -> tuple[Readings, Cur
 
 
 def _without_largest_jumps(readings: Readings, current: Current, settle: Settle) -> tuple[Readings, Current]:
-    """The readings without the jumps that are likelier than none, and their flight."""
+    """The readings without the jumps that are likelier than none, or without those of a station that is at a wrong
+    place, and their flight."""
     for _ in range(LASTING_ROUNDS):
-        if not (_contradict(current) or _rejects_many(current)):
+        if not (_contradict(current) or _rejects_many(current) or _surprise(current) > odds.SURE):
             break
         least = score(current) + odds.SURE - odds.FAULT + math.log(len(current.events.time_s))
         agree = _others_that_agree(readings, settle)
+        alone, misplaced = _left_out(readings, agree), _misplaced(readings, current, agree)
         tried = _without_jumps(readings, current, agree, settle)
         s, jump, first = max(tried, key=lambda each: score(each[2]), default=(0, None, current))
         if jump is not None and score(first) >= least:
             found, flight = _as_all_tell(readings, s, jump, first, settle)
-            if not (_contradict(flight) and _left_out(readings, agree)):
+            probable = misplaced is None or (s == misplaced[0] and _surprise(flight) < odds.SURE)
+            if probable and not (_contradict(flight) and alone):
                 readings, current = found, flight
                 continue
-        if _contradict(current) and (alone := _left_out(readings, agree)):
-            s, current = alone
+        if misplaced or (_contradict(current) and alone):
+            s, current = misplaced or alone or (0, current)
             readings = readings._replace(banned=_banned(readings, s))
         break
     return readings, current
+
+
+def _surprise(current: Current) -> float:
+    """By how much less likely its biases are than biases are in the mean, in log-probability."""
+    constants = current.constants
+    free = constants.prior > 0
+    return 0.5 * float(((constants.estimate[free] / constants.prior[free]) ** 2 - 1.0).sum())
+
+
+def _misplaced(readings: Readings, current: Current, agree: dict[int, Current]) -> tuple[int, Current] | None:
+    """The one station without which the biases of all others are probable, and their flight: a wrong place looks like
+    biases of all stations."""
+    gain = {s: _surprise(current) - _surprise(agree[s]) for s in agree if _others_tell(readings, s)}
+    order = sorted(gain, key=lambda s: -gain[s])
+    if not order or gain[order[0]] < odds.SURE - odds.FAULT:
+        return None
+    alike = len(order) > 1 and gain[order[0]] < gain[order[1]] + odds.LIKELIER
+    return None if alike else (order[0], agree[order[0]])
 
 
 def _others_that_agree(readings: Readings, settle: Settle) -> dict[int, Current]:
@@ -127,13 +148,18 @@ def _left_out(readings: Readings, agree: dict[int, Current]) -> tuple[int, Curre
     their flight."""
     found = None
     for s, flight in agree.items():
-        others = [len(each.components) for k, each in enumerate(readings.stations) if k != s]
-        if len(others) < 2 or sum(others) <= DETERMINED or flight.constants.farthest > IMPROBABLE:
+        if not _others_tell(readings, s) or flight.constants.farthest > IMPROBABLE:
             continue
         if found is not None:
             return None
         found = s, flight
     return found
+
+
+def _others_tell(readings: Readings, s: int) -> bool:
+    """Whether stations but one would show that they do not agree."""
+    others = [len(each.components) for k, each in enumerate(readings.stations) if k != s]
+    return len(others) > 1 and sum(others) > DETERMINED
 
 
 def _banned(readings: Readings, s: int) -> list[NDArray[np.bool_]]:
