@@ -87,6 +87,23 @@ def test_a_name_that_says_more_than_the_unit_is_asked_about(log: Log, range_: st
     assert len(logs.read(path, units={"range": "km" if "km" in range_ else "m"})) == 60
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "# range scale factor: 1.0", "# range offset 0.000", "# max range 40 km, time offset 0.5 s",
+        "# data from S. Smith",
+        "# target below horizon at start", "# wind from south, 5 m/s", "# max ground range 300 km",
+    ],
+)  # fmt: skip
+def test_lines_that_change_nothing_are_passed_over(log: Log, line: str) -> None:
+    assert len(logs.read(log(f"{line}\n{PLAIN}"))) == 60
+
+
+def test_a_column_beside_the_range_may_say_anything(log: Log) -> None:
+    rows = "".join(f"{row},5\n" for row in ROWS.split())
+    assert len(logs.read(log(f"{PLAIN},Range offset 2 two-way", rows))) == 60
+
+
 @pytest.mark.parametrize("name", ["El (deg, positive down)", "Elevation (deg; + down)", "Tiefenwinkel (deg)"])
 def test_angles_that_are_said_to_count_downwards_are_turned_round(log: Log, name: str) -> None:
     up, down = (logs.read(log(f"Time (s),Range (m),Az (deg),{each}")) for each in ("El (deg)", name))

@@ -21,20 +21,24 @@ from ftproc.files.words import ALIASES, DEPRESSIONS, QUANTITIES
 from ftproc.settings import Station
 
 _OF_UNITS, _VALUE = ("units", "unit", "uom", "einheit", "unité"), ("value", "val")  # how names of columns end
+#: Words of what readings are multiplied by or what is added to them, and a number that changes something.
+_SCALES = r"\b(?:scale|factor|multipl\w+|divid\w+|offset)\b[^,;|]{0,25}?"
+_BY, _RANGE = r"(?!0*1?(?:\.0*)?(?![\d.]))(?<![\d.])\d", r"\b(?:range|distance)s?\b[^,;|]{0,25}?"
 #: What a line above the table may say -> the quantity that it is about, what that means, and the options that say it.
 _CONVENTIONS = (
     (r"two[- ]?way|round[- ]?trip|there and back|\b2\s?R\b|hin-? und (?:her|rück)|aller[- ]?retour|andata e ritorno"
      r"|ida y vuelta|往返", "range", "ranges there and back", "--units 'range=0.5 m' (half of each)"),
     (r"(?:ranges?|distances?|entfernungen|strecken)\s+(?:(?:are|is|sind)\s+)?(?:horizontal\b(?! angle)|reduced to)"
-     r"|horizontal(?:ly)?[ _-]?(?:ranges?|distan\w+|entfernung)|ground ranges?\b", "range", "horizontal distances",
-     "--columns range=none, or divide them by the cosine of the elevation"),
-    (r"(?:range|dist)\w*\b.*\b(?:scale|factor|multipl\w+|divid\w+|offset)\b.*\d"
-     r"|\b(?:scale|factor|multipl\w+|divid\w+|offset)\b.*\b(?:range|distance)s?\b.*\d",
+     r"|horizontal(?:ly)?[ _-]?(?:ranges?|distan\w+|entfernung)|\b(?:as|are|:) ground ranges\b",
+     "range", "horizontal distances", "--columns range=none, or divide them by the cosine of the elevation"),
+    (f"{_RANGE}{_SCALES}{_BY}|{_SCALES}{_RANGE}{_BY}",
      "range", "a factor or an offset", "--units 'range=10 m' (what one is worth), or the bias in a --config FILE"),
     (r"zenith(?:al)?[ -](?:distance|angle)", "elevation", "angles from the zenith", "--elevation-from zenith"),
-    (wording.DOWNWARD, "elevation", "angles below the horizontal", "so by naming the column Depression"),
-    (r"(?:from|zero(?: is)? (?:at|in|to(?:wards?)?)|zero\s*[:=]|counted from|\bab|\bvon|depuis(?: le)?|desde el)\s*"
-     r"(?:the )?(?:south|süd(?:en)?|sud|sur)\b|south is zero|\bS(?:outh)?\s*=\s*0\b|(?<![\w.])from S\b",
+    (rf"(?:elev\w*|\bel|angles?)\b[^,;|]{{0,30}}?(?:{wording.DOWNWARD})",
+     "elevation", "angles below the horizontal", "so by naming the column Depression"),
+    (r"south is zero|(?:zero at|counted from) (?:the )?south\b|(?:\baz\w*|bearings?|richtung\w*)\b[^;|]{0,40}?"
+     r"(?:(?:from|\bzero(?: is)?(?: at| in|\s*[:=])?|\bab|\bvon|depuis(?: le)?|desde el)\s*(?:the )?"
+     r"(?:south|süd(?:en)?|sud|sur|S)\b|\bS(?:outh)?\s*=\s*0\b)",
      "azimuth", "azimuths from south", "--config FILE with from = \"north\" and zero_deg = 180 under [azimuth] in it"),
 )  # fmt: skip
 
@@ -158,13 +162,14 @@ def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, s
     settled = {
         "range": "range" in stated or not any(name.means("range") for name in names),
         "elevation": station.elevation_from is not None
-        or any(name.is_zenith() or name.stem in DEPRESSIONS for name in names),
+        or any(name.is_zenith() or wording.key_of(name.text, "elevation", name.stem) in DEPRESSIONS for name in names),
         "azimuth": station.azimuth_from is not None or station.azimuth_zero_rad != 0.0,
     }
     for pattern, quantity, what, say in _CONVENTIONS:
         if settled[quantity]:
             continue
-        mine = [(k, n.text) for k, n in enumerate(names) if n.means(quantity) or {*n.words} & {*ALIASES[quantity]}]
+        mine = [(k, name.text) for k, name in enumerate(names) if name.means(quantity)]
+        mine = mine or [(k, name.text) for k, name in enumerate(names) if {*name.words} & {*ALIASES[quantity]}]
         line = next((line for line in header.above if re.search(pattern, line, re.IGNORECASE)), "").strip()[:80]
         where = f'a line above the table, "{line}",' if line else ""
         if quantity != "elevation":  # whose names are heard

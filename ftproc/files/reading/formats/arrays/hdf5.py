@@ -232,7 +232,8 @@ def _values(file: Any, one: Stored, room: Room, matrices: dict[str, Any]) -> Any
         return matrix[one.column] if vectors.lies(matrix.shape) else matrix[:, one.column]
     selected = dataset.fields(one.field) if one.field else dataset
     if one.dtype.kind != "O":
-        return vectors.unpacked(np.asarray(selected[()]).reshape(-1), lambda key: _attribute(dataset, key, 1))
+        values = np.asarray(selected[()]).reshape(-1)
+        return values if one.field else vectors.unpacked(values, lambda key: _attribute(dataset, key, 1))
     return _texts(selected, one, room)
 
 
