@@ -107,8 +107,8 @@ def _without_largest_jumps(readings: Readings, current: Current, settle: Settle)
             if probable and not (_contradict(flight) and alone):
                 readings, current = found, flight
                 continue
-        if misplaced or (_contradict(current) and alone):
-            s, current = misplaced or alone or (0, current)
+        if (out := misplaced or (alone if _contradict(current) else None)) is not None:
+            s, current = out
             readings = readings._replace(banned=_banned(readings, s))
         break
     return readings, current
