@@ -55,6 +55,9 @@ def holding(seed: int, dt_s: float, lasts_s: float) -> tuple[MeasurementLog, Flo
     return _noisy(position, time[::every], (8.0, 4e-4, 6e-4), rng), position
 
 
+SOARING_SIGMA = (10.0, 5e-4, 5e-4)
+
+
 def soaring(seed: int) -> tuple[MeasurementLog, FloatArray]:
     """A log of a glider that glides and climbs in circles of some 20 s, four times each, as a radar sees it once a
     second: 10 m and 0.5 mrad. And the true positions (n, 3) m."""
@@ -69,7 +72,14 @@ def soaring(seed: int) -> tuple[MeasurementLog, FloatArray]:
     along = step_s * speed_mps * np.cumsum(np.stack([np.cos(heading), np.sin(heading)], 1), axis=0)
     height = 1000 + step_s * np.cumsum(np.where(np.abs(rate) > 0.1, 2.0, -1.0))
     position = np.column_stack([along + np.array([4000.0, 1500.0]), height])[::10]
-    return _noisy(position, np.arange(float(len(position))), (10.0, 5e-4, 5e-4), rng), position
+    return _noisy(position, np.arange(float(len(position))), SOARING_SIGMA, rng), position
+
+
+def coarse(log: MeasurementLog, step: float, share: float, seed: int) -> MeasurementLog:
+    """A glider's log rounded to so many sigmas, with a share of outliers of 10 to 100."""
+    rng, sigma = np.random.default_rng([seed, 1]), np.array(SOARING_SIGMA)
+    z = log.measurement + (rng.random((len(log), 3)) < share) * rng.uniform(10, 100, (len(log), 3)) * sigma
+    return replace(log, measurement=np.round(z / (step * sigma)) * step * sigma)
 
 
 def read(

@@ -19,6 +19,8 @@ from ftproc.core import threads
 from ftproc.core.editing.lasting.ends import End
 from ftproc.core.editing.lasting.screen import leaves_curves
 from ftproc.core.editing.lasting.weighing import as_it_is, scene_of
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.identification.profile import median_level
 from ftproc.errors import FtprocError
 from ftproc.methods import bridging
 from ftproc.quality.verdict import CONSISTENT
@@ -62,6 +64,11 @@ def _in_sight(found: Any, work: Any) -> Any:
 
 def _at_typical_noise(part: Any, few: Any, most: Any, least: float) -> bool:
     return leaves_curves(part, most, least, as_it_is(part, part.log.weight, part.at_median))
+
+
+def _by_the_median(log: Any, model: Any, at_median: Any = None) -> Any:
+    typical = at_median or median_level(model)
+    return find_starts(log, typical.noise_variance, float(typical.jerk[0, 0]))
 
 
 def _same_screen(screen: Callable[..., Any], *arguments: Any) -> Any:
@@ -119,6 +126,12 @@ RULES: dict[str, tuple[Off, ...]] = {
     ),
     "jumps that the process noise hides": (Off(f"{EDITING}.lasting.screen", "HIDDEN", np.inf),),
     "clocks that jump in a gap": (Off(f"{EDITING}.lasting.clock", "gaps", _empty),),
+    "clocks that leave nothing of a gap": (Off(f"{EDITING}.lasting.clock", "leaves_gap", lambda *_: False),),
+    "process noise beside gaps": (
+        Off(f"{EDITING}.reassessment", "starts_of", _by_the_median),
+        Off(f"{EDITING}.lasting.weighing", "starts_of", _by_the_median),
+    ),
+    "bends that outliers make": (Off(f"{EDITING}.copies", "BENDS", 10**9),),
     "noise of what is rejected": (Off(TWO_PASS, "_rejects_many", lambda *_: False),),
     "others that are as likely": (Off(TWO_PASS, "others", _empty),),
     "curves that leave too little to a patch": (

@@ -23,7 +23,7 @@ from ftproc.simulation import list_scenarios, parse_instrument, simulate
 from ftproc.simulation.ranges import RANGES, simulate_range
 from tests import drone
 from tests.bench import instruments
-from tests.trust import faulty_logs, hard
+from tests.trust import faulty_logs, hard, hard_flights
 
 SEEDS = (300, 301)
 LONGEST_S = 240.0
@@ -31,6 +31,8 @@ LONGEST_S = 240.0
 DRONES = {"1": (0.02, 3e-5, 3e-5), "0.5": (0.005, 1e-5, 1e-5), "0.2": (0.002, 1e-5, 1e-5)}
 #: Seconds between the ranges of an instrument, and from each to the angles that belong to it.
 APART = {"5": 0.006, "0.5": 0.001}
+GAPS = (9, 11, 43, 57)  # flights with gaps
+COARSE, OFF = ("2", "4"), 0.05  # sigmas to which a glider's readings are rounded, and share of outliers among them
 WAVES = ("sine/36", "sine/42", "sine/54")  # patches of hard flights that go to and fro
 HELD_S = 1200.0  # of an aircraft that holds, at 10 Hz
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -59,7 +61,8 @@ def names() -> list[str]:
     slow += [f"apart/{dt_s}/{seed}" for dt_s in APART for seed in SEEDS]
     slow += [f"holding/0.1/{seed}" for seed in (*SEEDS, 404)]  # of which one seems to have three times its noise,
     slow += [f"soaring/1/{seed}" for seed in (78, *SEEDS)]  # and of these one to be off in its circles
-    waves = [f"hard/{what}" for what in WAVES]
+    slow += [f"coarse/{step}/{seed}" for step in COARSE for seed in SEEDS]
+    waves = [f"gaps/all/{number}" for number in GAPS] + [f"hard/{what}" for what in WAVES]
     fused = [f"range/{name}/{seed}" for name in RANGES for seed in SEEDS]
     samples = [f"sample/{path.name}/0" for path in sorted(SAMPLES.iterdir()) if _is_log(path)]
     return [*samples, "range/sample/0", *scenarios, *effects, *faults, *waves, *slow, *fused]
@@ -132,6 +135,16 @@ def _soaring(what: str, seed: int, room: Path) -> Seen:
     return Seen(log, log.time_s, position_m)
 
 
+def _coarse(what: str, seed: int, room: Path) -> Seen:
+    log, position_m = drone.soaring(seed)
+    return Seen(drone.coarse(log, float(what), OFF, seed), log.time_s, position_m)
+
+
+def _gaps(what: str, seed: int, room: Path) -> Seen:
+    found = hard_flights.with_gaps(seed).simulated
+    return Seen(found.log, found.truth.time_s, found.truth.position_m)
+
+
 def _range(what: str, seed: int, room: Path) -> Seen:
     if what == "sample":
         return Seen(SAMPLES / "range")
@@ -156,6 +169,8 @@ _MAKERS: dict[str, Callable[[str, int, Path], Seen]] = {
     "apart": _apart,
     "holding": _holding,
     "soaring": _soaring,
+    "coarse": _coarse,
+    "gaps": _gaps,
     "range": _range,
 }
 

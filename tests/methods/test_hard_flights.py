@@ -13,6 +13,7 @@ from ftproc.records import MISSING
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from tests.methods.flights import PATHS, TIME, begins, flown, held, measured, rms, run, turned
+from tests.trust import hard_flights
 from tests.trust.long_runs import is_diverged
 
 SETTINGS = [
@@ -168,3 +169,14 @@ def test_alternatives_are_tried_again_when_the_jerk_level_is_another():
     flight = simulate("overhead", seed=37, duration_s=60.0, dt_s=0.1, outliers=patches)
     found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
     assert rms(found, flight.truth.position_m) < 5.0  # 68 otherwise
+
+
+@pytest.mark.parametrize(("number", "rms_m"), [(9, 0.15), (11, 0.01), (57, 5.0)])
+def test_gaps_of_agile_flights_are_no_jumps_of_the_clock(number, rms_m):
+    """Tight circles, a drone that races, and a fighter: .25, 20.7 and 225 m off where a clock may jump by a part of a
+    gap, or a gap is bridged by the typical process noise."""
+    made = hard_flights.with_gaps(number).simulated
+    found = pipeline.filter_log(made.log, FilterSettings(smooth=True))
+    off = found.state[:, :3] - made.truth.position_m
+    assert np.sqrt((off**2).sum(1).mean()) < rms_m
+    assert not found.metadata["summary"].get("steps")

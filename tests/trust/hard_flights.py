@@ -258,3 +258,10 @@ def log(seen: Seen, outliers: str, name: str, seed: list[int]) -> Faulty:
     sigma = (float(seen.sigma[0]), float(seen.sigma[1]), float(seen.sigma[2]))
     plan = Plan("", seen.lasts_s, seen.dt_s, sigma, outliers, PERFECT)
     return Faulty(measure(seen.flight, plan, seen.sigma, name, seed), f"{seen.name}, {outliers}")
+
+
+def with_gaps(number: int) -> Faulty:
+    """The log of a flight without another fault than three gaps of at least four samples, up to a thirteenth of it."""
+    seen, seed = take(number, np.random.default_rng([99, number])), [99, number]
+    shortest_s, longest_s = max(4 * seen.dt_s, seen.lasts_s / 40), seen.lasts_s / 13
+    return log(seen, f"gap=3:{shortest_s:.4g}-{longest_s:.4g}", f"gaps {number}", seed)
