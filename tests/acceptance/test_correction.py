@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from ftproc import pipeline
 from ftproc.correction import model_file
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.simulation import simulate
+from tests.bench import correction
 from tests.bench.correction import CASES, result
 
 QUICK = TrainSettings(epochs=120, population=10, generations=10)
 
 
-@pytest.mark.parametrize(("name", "bound"), [("a", 0.65), ("c", 0.95)])
+@pytest.mark.parametrize(("name", "bound"), [("a", 0.65), pytest.param("c", 0.95, marks=pytest.mark.slow)])
 def test_a_filter_with_wrong_settings_is_corrected(name, bound):
     found = result(replace(CASES[name], training=14, duration_s=50.0), new=4, settings=QUICK)
     assert found.ratio() <= bound
@@ -28,7 +30,8 @@ def test_an_instrument_learned_from_two_calibration_flights_is_corrected_on_new_
     assert found.ratio("smoother position") <= 0.5
 
 
-def test_servo_circles_and_range_walk_are_learned():
+def test_servo_circles_and_range_walk_are_learned(monkeypatch):
+    monkeypatch.setattr(correction, "flights", cache(correction.flights))
     case = replace(CASES["all"], training=14, duration_s=50.0)
     ratios = [result(case, new=3, settings=replace(QUICK, seed=seed)).ratio("smoother position") for seed in range(2)]
     assert max(ratios) <= 0.4

@@ -44,14 +44,18 @@ def kept(parts):
     }
 
 
-@pytest.mark.parametrize("given", [{}, GIVEN], ids=["found", "specified"])
-def test_recursion_in_blocks_is_the_recursion_bit_for_bit(flight, given):
+@pytest.mark.parametrize(
+    ("given", "blocks", "rows", "missing"),
+    [({}, (300,), 1500, slice(600, 1300)), (GIVEN, (300, 1000), 2400, slice(1000, 2100))],
+    ids=["found", "specified"],
+)
+def test_recursion_in_blocks_is_the_recursion_bit_for_bit(flight, given, blocks, rows, missing):
     settings = FilterSettings(editing="forward", **given)
-    log = start_of(flight.log, 2400)
-    log.measurement[1000:2100, 2] = np.nan  # longer than a block, and than what is remembered
+    log = start_of(flight.log, rows)
+    log.measurement[missing, 2] = np.nan  # longer than a block, and than what is remembered
     whole = list(live.parts(record(log), settings, len(log)))
     one = kept(whole)
-    for block in (300, 1000):
+    for block in blocks:
         parts = list(live.parts(record(log), settings, block))
         assert len(parts) == -(-len(log) // block)
         many = kept(parts)
@@ -218,9 +222,9 @@ def test_every_stretch_of_a_log_with_range_rates_has_their_labels(flight):
 
 def test_rows_before_the_first_elevation_have_the_prior_of_any_target_live(flight):
     """They had an elevation of zero as if it were read, kilometres off."""
-    log = start_of(flight.log, 900)
+    log = start_of(flight.log, 600)
     log.measurement[:300, 2] = np.nan
-    for block in (900, 100):
+    for block in (600, 100):
         parts = list(live.parts(record(log), FilterSettings(editing="live"), block))
         absent = np.concatenate([np.full(part.high - part.low, 2 in part.estimate.absent) for part in parts])
         assert absent[:300].all()

@@ -111,15 +111,13 @@ def test_curve_is_not_confirmed_but_a_step_is():
 
 
 @pytest.mark.compiled
-def test_weak_patches_are_found():
+@pytest.mark.parametrize("seed", [0, 9, pytest.param(5, marks=pytest.mark.slow)])
+def test_weak_patches_are_found(seed):
     """Patches of 3 to 8 sigmas, which hide between manoeuvres and noise."""
-    found = []
-    for seed in (0, 5, 9):
-        flight = simulate("manoeuvre", seed=seed, outliers="patch=6:5-40:3-8")
-        edited = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
-        bad = codes(flight) > 0
-        found.append((edited.weight[bad] == 0).mean())
-        assert (edited.weight[~bad] == 0).mean() < 0.002
-        error = np.linalg.norm(edited.smoothed().state[:, :3] - flight.truth.position_m, axis=1)
-        assert np.sqrt((error**2).mean()) < 1.7
-    assert np.mean(found) > 0.6
+    flight = simulate("manoeuvre", seed=seed, outliers="patch=6:5-40:3-8")
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+    bad = codes(flight) > 0
+    assert (edited.weight[bad] == 0).mean() > 0.6
+    assert (edited.weight[~bad] == 0).mean() < 0.002
+    error = np.linalg.norm(edited.smoothed().state[:, :3] - flight.truth.position_m, axis=1)
+    assert np.sqrt((error**2).mean()) < 1.7
