@@ -19,13 +19,13 @@ SMALL = ("--population", 6, "--generations", 2, "--epochs", 5, "--hidden", 4)
 
 def simulate(run, number):
     names = f"{number}.parquet", f"{number}.truth.csv"
-    args = ("--duration", 30, "--dt", 0.1, "--seed", number)
+    args = ("--duration", 20, "--dt", 0.1, "--seed", number)
     assert run("simulate", "--scenario", "manoeuvre", *args, "-o", names[0], "--truth", names[1]).code == 0
     return ["--log", names[0], "--truth", names[1]]
 
 
 def test_from_logs_with_truth(run, here):
-    pairs = [part for number in range(4) for part in simulate(run, number)]
+    pairs = [part for number in range(3) for part in simulate(run, number)]
     trained = run("train", *pairs, *SMALL, "-o", "model.safetensors")
     assert trained.code == 0, trained.err
     assert trained.out.startswith("Correction model, schema 2\ntraining: editing two-pass, epochs 5, features auto, ")
@@ -44,7 +44,7 @@ def test_a_truth_on_the_earth_needs_the_site(run, here):
 
 
 def test_from_past_logs_without_truth(run, here):
-    logs = [part for number in range(4) for part in simulate(run, number)[:2]]
+    logs = [part for number in range(3) for part in simulate(run, number)[:2]]
     trained = run("train", *logs, *SMALL, "-o", "model.safetensors")
     assert trained.code == 0, trained.err
     assert "teacher smoother" in trained.out

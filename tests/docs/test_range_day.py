@@ -137,7 +137,7 @@ def test_the_cluster(place: Path) -> None:
 
 def test_workers_need_the_memory_that_the_page_says(place: Path) -> None:
     """The largest worker after several logs of 10,000 rows each."""
-    for number in range(6):
+    for number in range(4):
         log = simulate("manoeuvre", seed=number, duration_s=500.0).log
         flights.write_log(log, place / "flights" / f"long{number}.csv")
     script = (

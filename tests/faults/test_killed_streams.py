@@ -18,8 +18,8 @@ from tests.faults.batches import PROGRAM
 from tests.trust import cases
 from tests.trust.streams import flight, lines
 
-KILLS = int(os.environ.get("FTPROC_KILLS", "6"))  # 50 of them take a few minutes
-RATE = 20.0  # rows in a second
+KILLS = int(os.environ.get("FTPROC_KILLS", "4"))  # 50 of them take a few minutes
+RATE = 30.0  # rows in a second
 
 
 def grow(log: Path, ended: threading.Event) -> None:

@@ -110,10 +110,10 @@ def test_a_browser_that_fails_leaves_the_earlier_file(browser, tmp_path, scratch
 
 def test_a_browser_that_hangs_is_ended_with_all_that_it_started(browser, tmp_path, monkeypatch):
     monkeypatch.setattr(printing, "PATIENCE_S", 0.5)
-    browser(f"(sleep 4; touch {tmp_path}/survived) & sleep 60")
+    browser(f"(sleep 2.5; touch {tmp_path}/survived) & sleep 60")
     with pytest.raises(OutputError, match=r"acme-browser did not print the page \(it took more than 0.5 s\)"):
         printing.write("<html>", tmp_path / "flight.pdf")
-    time.sleep(5)
+    time.sleep(3)
     assert not (tmp_path / "survived").exists()
 
 

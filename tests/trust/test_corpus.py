@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import resource
 import subprocess
@@ -20,10 +21,15 @@ MANY = 300
 MOST_MEMORY_KB = 3 << 20
 
 
+#: Of many damaged files that are alike, one in so many; `make trust` takes them all.
+EVERY = {"bad_stations": 4, "bad_models": 3}
+
+
 @pytest.mark.parametrize("table", corpus.TABLES, ids=lambda table: table.__name__.rpartition(".")[2])
 def test_each_is_refused_plainly_or_read_correctly(table: ModuleType, tmp_path: Path) -> None:
     wrong, known = [], []
-    for number, case in enumerate(table.all_cases()):
+    every = EVERY.get(table.__name__.rpartition(".")[2], 1)
+    for number, case in enumerate(itertools.islice(table.all_cases(), 0, None, every)):
         directory = tmp_path / str(number)
         directory.mkdir()
         try:

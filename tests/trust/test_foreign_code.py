@@ -48,7 +48,7 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Hostile:
         (PROGRAM, *TRAIN, *LITTLE, "--jobs", "2", "-o", "m.safetensors"),
         (PROGRAM, *TRAIN, *LITTLE, "--jobs", "2", "--compare-starts"),
         (PROGRAM, "score", "o/a.trajectory.csv", "--truth", "a.truth.csv", "--report", "s.html"),
-        (PROGRAM, "simulate", "--scenario", "range-radar", "--duration", "20", "-o", "range/"),
+        (PROGRAM, "simulate", "--scenario", "range-radar", "--duration", "10", "-o", "range/"),
         (PROGRAM, "filter", "--fuse", "range/range.toml", "-o", "best.parquet"),
         (*MODULE, "filter", "a.csv", "b.csv", "-o", "q/", "--jobs", "2"),
     ],
