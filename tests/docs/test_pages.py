@@ -16,6 +16,7 @@ from tests.docs.shell import ROOT, Shell
 
 NUMBER = re.compile(r"[-+]?(?:\d+\.\d+(?:e[-+]\d+)?|\d\.?\d*e[-+]\d+)")  # not a count
 MOST_LINES = 200
+LONG = dict.fromkeys(("train", "train-use", "all-methods"), pytest.mark.slow)  # blocks that the commands take long for
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +35,28 @@ def same(one: str, other: str) -> bool:
     return words[0] == words[1] and figures[0] == pytest.approx(figures[1], rel=0.01, abs=0.001)
 
 
-@pytest.mark.parametrize("name", [name for name, block in BLOCKS.items() if not block.slow])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=LONG.get(name, [])) for name, block in BLOCKS.items() if not block.slow]
+)
 def test_a_block_is_what_its_commands_print_now(name: str, shell: Shell) -> None:
     assert same(standing()[name], BLOCKS[name].text(name, shell)), f"run: make readme BLOCKS={name}"
+
+
+def test_a_model_is_trained_and_used_by_the_commands_of_the_page(tmp_path: Path) -> None:
+    """On a short flight, with little effort: words, not figures, are those of the page."""
+    place, used = Shell(tmp_path), BLOCKS["train-use"]
+    fly, train, fly_again = used.before
+    for command in (
+        fly.replace("--duration 600", "--duration 140"),
+        fly_again.replace("--duration 200", "--duration 40"),
+    ):
+        place.output(command)
+    said = place.output(f"{train} --epochs 3 --population 4 --generations 1")
+    assert all(f"\n{words}" in said for words in ("filter: ", "smoother: ", "Position error"))
+    scores = [place.output(command) for command in used.commands][-1]
+    assert all(
+        words in standing()["train-use"] and words in scores for words in ("plain", "corrected", "position RMSE")
+    )
 
 
 def test_every_block_stands_on_one_page_under_its_command() -> None:
