@@ -17,7 +17,7 @@ settings.load_profile("suite")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "slow: takes more than half a minute; left out unless FTPROC_SLOW is set")
+    config.addinivalue_line("markers", "slow: takes long, or is much like another; left out unless FTPROC_SLOW is set")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -113,7 +113,12 @@ def test_a_process_started_for_work_is_deaf_to_ctrl_c_from_its_first_moment():
 
 @pytest.mark.parametrize(
     ("end", "group"),
-    [(signal.SIGKILL, False), (signal.SIGKILL, True), (signal.SIGHUP, False), (signal.SIGTERM, True)],
+    [
+        (signal.SIGKILL, False),
+        pytest.param(signal.SIGKILL, True, marks=pytest.mark.slow),
+        pytest.param(signal.SIGHUP, False, marks=pytest.mark.slow),
+        (signal.SIGTERM, True),
+    ],
 )
 def test_workers_end_with_the_process_that_started_them(tmp_path, end, group):
     """Also in the middle of a log; only what kills at once leaves a partial file."""

@@ -55,7 +55,7 @@ def test_zenith_angles_are_known_by_the_name_of_their_column(run, here, rows):
     assert table(followed.out)["elevation_rad"].mean() < 1
 
 
-@pytest.mark.parametrize("lag", ["0", "1"])
+@pytest.mark.parametrize("lag", [pytest.param("0", marks=pytest.mark.slow), "1"])
 def test_range_rates_are_used_as_of_a_complete_log(run, here, lag):
     flight = simulate("manoeuvre", seed=1, duration_s=30.0, dt_s=0.1)
     slant = np.sqrt((flight.truth.position_m**2).sum(1))

@@ -250,8 +250,14 @@ def test_outputs_of_one_content_may_be_linked(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "0.trajectory.csv").samefile(tmp_path / "out" / "1.trajectory.csv")
 
 
-@pytest.mark.parametrize("name", ["out.csv", "out.json"])
-@pytest.mark.parametrize("kind", ["hard", "soft", "moved"])
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        pytest.param(kind, name, marks=[] if (kind == "soft") == (name == "out.json") else pytest.mark.slow)
+        for kind in ("hard", "soft", "moved")
+        for name in ("out.csv", "out.json")
+    ],
+)
 def test_an_output_that_comes_to_name_the_log(tmp_path: Path, name: str, kind: str) -> None:
     """While the log is followed."""
     batches.fill(tmp_path, 1)

@@ -19,6 +19,7 @@ from ftproc.simulation import simulate
 from tests.faults.batches import PROGRAM
 
 UNBUFFERED = {**os.environ, "PYTHONUNBUFFERED": "1"}
+ENVIRONMENTS = {"buffered": dict(os.environ), "unbuffered": UNBUFFERED}
 COMMANDS = {
     "filter": ("filter", "long.csv", "-o", "-", "--summary", "none"),
     "follow": ("filter", "-", "--follow", "--summary", "none"),
@@ -66,7 +67,9 @@ def _until_full(process: subprocess.Popen[bytes]) -> None:
     raise AssertionError("the pipe is not full")
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command", [pytest.param(name, marks=pytest.mark.slow) if name == "follow jsonl" else name for name in COMMANDS]
+)
 def test_stopped_and_continued_all_is_written(place: Path, command: str) -> None:
     """A raw stream then takes less than it is given."""
     with (place / "long.csv").open("rb") as log:
@@ -85,9 +88,18 @@ def test_stopped_and_continued_all_is_written(place: Path, command: str) -> None
     assert out == whole.stdout
 
 
-@pytest.mark.parametrize("environment", [dict(os.environ), UNBUFFERED], ids=["buffered", "unbuffered"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("command", "number", "environment"),
+    [
+        pytest.param(
+            name, number, environment, id=f"{name}-{number}-{kind}",
+            marks=[] if (k + (number == signal.SIGINT)) % 2 == (kind == "buffered") else pytest.mark.slow,
+        )
+        for k, name in enumerate(COMMANDS)
+        for number in (signal.SIGINT, signal.SIGTERM)
+        for kind, environment in ENVIRONMENTS.items()
+    ],
+)  # fmt: skip
 def test_signals_are_heard_while_the_reader_stalls(
     place: Path, command: str, number: signal.Signals, environment: dict[str, str]
 ) -> None:
@@ -146,7 +158,7 @@ def test_a_pipe_that_does_not_block(place: Path) -> None:
     assert len(found.splitlines()) == len((place / "long.csv").read_bytes().splitlines())
 
 
-@pytest.mark.parametrize("environment", [dict(os.environ), UNBUFFERED], ids=["buffered", "unbuffered"])
+@pytest.mark.parametrize("environment", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_full_disk(place: Path, command: str, environment: dict[str, str]) -> None:
     with (place / "long.csv").open("rb") as log, Path("/dev/full").open("wb") as full:
@@ -161,8 +173,15 @@ def test_a_full_disk(place: Path, command: str, environment: dict[str, str]) -> 
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("more", [(), ("--follow",)], ids=["filter", "follow"])
-@pytest.mark.parametrize("read", [False, True], ids=["no reader", "a reader that stalls"])
+@pytest.mark.parametrize(
+    ("read", "more"),
+    [
+        pytest.param(False, ("--follow",), id="no reader-follow"),
+        pytest.param(True, (), id="a reader that stalls-filter"),
+        pytest.param(False, (), id="no reader-filter", marks=pytest.mark.slow),
+        pytest.param(True, ("--follow",), id="a reader that stalls-follow", marks=pytest.mark.slow),
+    ],
+)
 def test_a_named_pipe(place: Path, number: signal.Signals, more: tuple[str, ...], read: bool) -> None:
     pipe = place / "pipe.parquet" if read else place / "pipe.csv.gz"
     pipe.unlink(missing_ok=True)

@@ -149,7 +149,13 @@ def test_a_station_a_kilometre_off_its_place(run, folder, station):
     assert "check its place, its clock and its conventions" in result.out
 
 
-@pytest.mark.parametrize(("sigma", "sentence"), [("0", "all clocks are taken as exact"), ("0.08", "no clock is the")])
+@pytest.mark.parametrize(
+    ("sigma", "sentence"),
+    [
+        pytest.param("0", "all clocks are taken as exact", marks=pytest.mark.slow),
+        ("0.08", "no clock is the"),
+    ],
+)
 def test_clocks_that_are_all_alike(run, folder, sigma, sentence):
     path = folder / "range.toml"
     path.write_text(re.sub("clock_offset_sigma_s = .*", f"clock_offset_sigma_s = {sigma}", path.read_text()))

@@ -86,6 +86,7 @@ def _placed(folder, lower_m):
     return np.sqrt(((found.state[:, :3] - at) ** 2).sum(1).mean()), found.metadata["summary"]["trust"]
 
 
+@pytest.mark.slow
 def test_a_station_at_a_wrong_place_is_left_out_where_the_others_agree(tmp_path_factory):
     """Above the sea instead of the ellipsoid: the others were blamed, and the track was ten times as far off."""
     right, _ = _placed(tmp_path_factory.mktemp("right"), 0.0)

@@ -78,7 +78,8 @@ LOST_BY_BOTH = ("range-radars", 103, None, None)  # for 7 s both radars follow o
         ("range-radar", 5, 40.0, None),  # the first decisions must find jerk and outliers, not one after the other
         # the radar, which has most components, follows another target for 17 s
         pytest.param("range-dme", 101, None, None, marks=pytest.mark.slow),
-        ("range-theodolites", 102, None, None),  # the last two seconds of one azimuth are wrong
+        # the last two seconds of one azimuth are wrong
+        pytest.param("range-theodolites", 102, None, None, marks=pytest.mark.slow),
         LOST_BY_BOTH,
         ("range-dme", 102, None, 60.0),  # at first only the DME sees it, then a line of sight meets its sphere twice
     ],

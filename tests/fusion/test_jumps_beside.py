@@ -105,6 +105,7 @@ def fused(flown, folder):
     return off, trajectory.metadata["summary"]["trust"]
 
 
+@pytest.mark.slow
 def test_a_fused_flight_without_a_jump_of_a_clock_is_as_good_as_one_that_had_none(tmp_path):
     """The station is named with its size, and the run suspect."""
     flown, name = jumping("range-theodolites", 1, 1)

@@ -59,7 +59,7 @@ def test_the_readings_choose_how_an_aircraft_moves(stations, flight):
     assert velocity_error(found, flight, zero_s) < 1.02 * velocity_error(plain, flight, zero_s)
 
 
-@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize("smooth", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_gap_of_all_stations_is_crossed_in_steps(stations, flight, smooth):
     seen, zero_s = stations
     cut = []
@@ -74,7 +74,7 @@ def test_a_gap_of_all_stations_is_crossed_in_steps(stations, flight, smooth):
     assert GAP_S[1] - GAP_S[0] - 1 < gap < GAP_S[1] - GAP_S[0] + 1
 
 
-@pytest.mark.parametrize("better", [True, False])
+@pytest.mark.parametrize("better", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_motion_that_the_filter_does_not_follow_gives_way_to_white_jerk(stations, monkeypatch, better):
     """The smoother keeps its own."""
     real = motions.filtered

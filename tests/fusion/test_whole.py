@@ -47,7 +47,7 @@ def cut(station, until_s):
     )
 
 
-@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize("smooth", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_stretches_give_what_the_whole_gives(stations, at_once, monkeypatch, smooth):
     expected = at_once if smooth else fused(stations, smooth=False)
     in_parts(monkeypatch)
@@ -74,7 +74,7 @@ def test_a_station_may_be_silent_for_a_whole_stretch(stations, monkeypatch):
     assert all(np.isfinite(each).all() for each in found.position)
 
 
-@pytest.mark.parametrize("fails", [0, 1, -1])
+@pytest.mark.parametrize("fails", [pytest.param(0, marks=pytest.mark.slow), 1, -1])
 def test_a_stretch_without_a_first_track_joins_its_neighbour(stations, monkeypatch, fails):
     in_parts(monkeypatch)
     sizes, tried = [], []

@@ -122,7 +122,9 @@ def test_gap_of_half_a_minute(path, settings):
     assert (trajectory.sigma[begins(trajectory) :] > 0).all()
 
 
-@pytest.mark.parametrize(("seconds", "smooth"), [(60.0, True), (400.0, False), (400.0, True)])
+@pytest.mark.parametrize(
+    ("seconds", "smooth"), [(60.0, True), pytest.param(400.0, False, marks=pytest.mark.slow), (400.0, True)]
+)
 @pytest.mark.parametrize("path", ["orbit", "receding", "helix"])
 def test_gap_of_minutes_with_recursive_editing(path, seconds, smooth):
     log, position = with_gap(path, seconds)

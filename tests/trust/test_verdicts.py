@@ -10,7 +10,7 @@ from ftproc.settings import FilterSettings
 from tests.trust import faulty_logs
 
 
-@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("smooth", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_step_of_both_angles_after_a_short_gap_is_named(smooth: bool) -> None:
     log = faulty_logs.make("another lobe", 13).simulated.log
     found = pipeline.filter_log(log, FilterSettings(smooth=smooth)).metadata["summary"]

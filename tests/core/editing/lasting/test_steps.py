@@ -31,8 +31,14 @@ def edit(a, z):
     return two_pass.edit(a.time, z, UNKNOWN)
 
 
-@pytest.mark.parametrize("size", [20.0, 40.0, 300.0])
-@pytest.mark.parametrize(("c", "k"), [(0, 120), (1, 380), (2, 240)])
+@pytest.mark.parametrize(
+    ("c", "k", "size"),
+    [
+        pytest.param(c, k, size, marks=pytest.mark.slow if c == number else [])
+        for c, k in ((0, 120), (1, 380), (2, 240))
+        for number, size in enumerate([300.0, 20.0, 40.0])
+    ],
+)
 def test_a_step_is_found_with_its_place_and_size_and_the_longer_side_is_kept(c, k, size):
     a = flight(c)
     z = a.z.copy()
@@ -103,7 +109,7 @@ def test_steps_that_hard_flying_hides_among_many_outliers():
     assert found >= 4
 
 
-@pytest.mark.parametrize("late", [0.4, -0.8])
+@pytest.mark.parametrize("late", [0.4, pytest.param(-0.8, marks=pytest.mark.slow)])
 def test_a_clock_that_jumps(late):
     a = matched(11, N, dt=0.2, q=0.05, distance=7000.0)
     k = 300
