@@ -47,7 +47,7 @@ def test_a_repeatable_elevation_bias_is_taken_out_of_filter_and_smoother():
 
 
 def test_a_filter_with_right_settings_is_not_harmed():
-    found = result(replace(CASES["matched"], training=6, duration_s=40.0), new=3, settings=QUICK)
+    found = result(replace(CASES["matched"], training=4, duration_s=40.0), new=2, settings=QUICK)
     for what, squares in found.squares.items():
         assert found.ratio(what) <= 1.005
         assert (squares[:, 0] <= 1.01**2 * squares[:, 1]).all()

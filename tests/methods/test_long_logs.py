@@ -124,7 +124,7 @@ def test_each_segment_proves_its_correction(in_segments):
     assert better < 0.97 * plain
 
 
-@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("smooth", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_segments_agree_with_the_whole(in_segments, smooth):
     """Half of all samples within 0.15 of their sigma, 99 % within 1, also at the seams, and as accurate. (Decisions
     that hang in the balance, of a patch in a turn, may come out otherwise.)"""

@@ -189,7 +189,10 @@ def test_where_elevations_are_missing_heights_go_on() -> None:
     assert off[1] < 0.5 * off[0]
 
 
-@pytest.mark.parametrize("settings", [{"editing": "live"}, {"editing": "forward"}, {"method": "huber-ukf"}])
+@pytest.mark.parametrize(
+    "settings",
+    [pytest.param({"editing": "live"}, marks=pytest.mark.slow), {"editing": "forward"}, {"method": "huber-ukf"}],
+)
 def test_where_they_are_not_used_the_run_says_so(settings: dict[str, str]) -> None:
     flight, _ = poor()
     found = filter_log(with_heights(flight, measured(flight)), FilterSettings(**settings))

@@ -66,6 +66,7 @@ def test_the_page_is_printed(tmp_path, scratch):
 
 
 @NEEDED
+@pytest.mark.slow
 def test_hostile_names_are_printed(tmp_path):
     report.write(hostile(), tmp_path / "flight.pdf")
     assert (tmp_path / "flight.pdf").read_bytes().startswith(b"%PDF-")

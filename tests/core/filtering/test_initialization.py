@@ -277,6 +277,7 @@ def test_filter_is_re_initialized_after_one_component_was_blind_too_long(compone
 
 
 @pytest.mark.compiled
+@pytest.mark.slow
 def test_flights_with_blind_turns_do_not_run_away():
     """5 g turns seen once a second, with patches of half a minute, which are too long to coast through. What becomes of
     one such flight may hang on the last digit of a reading; what becomes of most does not."""

@@ -138,7 +138,7 @@ def test_no_curves_are_weighed_where_nothing_was_followed(monkeypatch):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("seed", [36, 42])
+@pytest.mark.parametrize("seed", [pytest.param(36, marks=pytest.mark.slow), 42])
 def test_a_wave_that_leaves_nothing_where_it_begins_and_ends_is_found(seed):
     """An azimuth of a drone that swings for 52 s, and the range of a fighter, for 22 s: 206 and 66 m off, and
     consistent, where the process noise alone follows them."""

@@ -158,7 +158,7 @@ def test_the_pieces_of_a_patch_are_found_each_by_itself():
     assert ((found.outlier != 0) == off).mean() > 0.999
 
 
-@pytest.mark.parametrize(("name", "seed"), [("offset", 3), ("walkoff", 4)])
+@pytest.mark.parametrize(("name", "seed"), [pytest.param("offset", 3, marks=pytest.mark.slow), ("walkoff", 4)])
 def test_a_jump_does_not_hide_in_noise_that_seems_to_grow(name, seed):
     """A bullet at 1000 Hz and a sea-skimmer: the range is off for a second by 45 sigmas, and walks off by 11 and comes
     back at once. The track was 331 and 44 sigmas off, and the verdict consistent."""
