@@ -24,8 +24,8 @@ from tests.trust import next_steps as table_of_steps
 SMOOTH = FilterSettings(smooth=True)
 
 
-def flight(seed: int, outliers: str | None = None) -> Simulation:
-    return simulate("manoeuvre", seed=seed, dt_s=0.1, duration_s=60, outliers=outliers)
+def flight(seed: int, outliers: str | None = None, duration_s: float = 60) -> Simulation:
+    return simulate("manoeuvre", seed=seed, dt_s=0.1, duration_s=duration_s, outliers=outliers)
 
 
 def found(log: MeasurementLog, settings: FilterSettings) -> tuple[pipeline.Filtering, np.ndarray]:
@@ -45,7 +45,7 @@ def first_step(filtering: pipeline.Filtering) -> tuple[next_steps.Step, dict]:
 
 #: What was specified that does not hold -> the advice.
 TOLD = {
-    "noise too small": (6, replace(SMOOTH, noise=(0.5, 2e-5, 2e-5)), "leave --noise out"),
+    "noise too small": (8, replace(SMOOTH, noise=(0.5, 2e-5, 2e-5)), "leave --noise out"),
     "jerk too small": (8, replace(SMOOTH, jerk_psd_m2ps5=1e-4), "leave --jerk out"),
     "jerk too large": (8, replace(SMOOTH, jerk_psd_m2ps5=1e7), "leave --jerk out"),
     "gate too small": (9, replace(SMOOTH, gate=1.5), "leave --gate out"),
@@ -53,7 +53,7 @@ TOLD = {
     "no editor": (14, replace(SMOOTH, method="ukf"), "leave --method out"),
     "weights alone": (15, replace(SMOOTH, method="huber-ukf"), "leave --method out"),
     "channels alone": (14, FilterSettings(method="gate"), "leave --method out"),
-    "two of them": (6, replace(SMOOTH, noise=(0.5, 2e-5, 2e-5), gate=2.0), "leave --noise and --gate out"),
+    "two of them": (7, replace(SMOOTH, noise=(0.5, 2e-5, 2e-5), gate=2.0), "leave --noise and --gate out"),
     "recursive": (12, FilterSettings(editing="forward"), "leave --editing out"),
 }
 
@@ -67,7 +67,8 @@ DEAR = "two of them", "jerk too large"
 def test_what_was_specified_and_does_not_hold_is_left_out_first(case: str) -> None:
     """The step makes the errors smaller, and the verdict no worse."""
     seed, settings, advice = TOLD[case]
-    this = flight(seed, "patch=4:10-40:30-200" if case in ("weights alone", "recursive") else None)
+    patches = "patch=4:10-40:30-200" if case in ("weights alone", "recursive") else None
+    this = flight(seed, patches, 60 if settings.noise is None else 30)  # what seems an outlier takes its time
     before, state = found(this.log, settings)
     assert level(before) > 0
     step, said = first_step(before)
