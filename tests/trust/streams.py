@@ -225,9 +225,9 @@ def judge(attack: Attack, directory: Path) -> str:
             cases.judge_sentence("-", sentence)
     assert bool(sentence) == (attack.says is not None), f"says {sentence!r}"
     assert (attack.says or "") in sentence, f'"{attack.says}" is not in: {sentence}'
-    counted = re.search(r"(\d+) came too late to be used", said[-1]) if said and not sentence else None
+    counted = re.findall(r"(\d+) (?:came too late to be used|rows have times far ahead)", "\n".join(said))
     if attack.rows:
-        _judge_rows(trajectories.read(output), attack, None if sentence else int(counted[1]) if counted else 0)
+        _judge_rows(trajectories.read(output), attack, None if sentence else sum(map(int, counted)))
     else:
         assert not output.exists(), "something was written"
     assert [path.name for path in directory.iterdir() if path.name.startswith(".")] == [], "a hidden file is left"
@@ -235,8 +235,8 @@ def judge(attack: Attack, directory: Path) -> str:
 
 
 def _judge_rows(found: Trajectory, attack: Attack, late: int | None) -> None:
-    """late: rows that were said to be; None where nobody counted."""
-    whole = f"{len(found)} rows are there, {late} late, of {attack.rows}"
+    """late: rows that were said to be, or to have a wrong time; None where nobody counted."""
+    whole = f"{len(found)} rows are there, {late} late or with a wrong time, of {attack.rows}"
     assert late is None or len(found) + late == attack.rows, whole
     known = np.isfinite(found.state).all(1)
     assert (known | np.isnan(found.state).all(1)).all(), "states that are not finite"
