@@ -43,6 +43,7 @@ class Following:
                 self._source = source
                 if self._offset is not None and isinstance(source, File):
                     source.offset = self._offset
+                yield None
                 yield from self._follow(source)
         except InputError as error:
             self.stream.fault = self.stream.fault or error

@@ -5,10 +5,11 @@ from __future__ import annotations
 import signal
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from ftproc.config.recipe import Recipe
-from ftproc.live import sources, stream
+from ftproc.live import publishing, sources, stream
 from ftproc.live import stop as stop_module
 from ftproc.live.following import Following
 from ftproc.live.live import Live
@@ -75,3 +76,24 @@ def test_a_time_that_would_make_all_others_late_is_left_out(tmp_path, monkeypatc
     rows, said = followed(tmp_path, monkeypatch, lines(times, np.arange(len(times))))
     assert rows.tolist() == [k for k in range(len(times)) if k != 100]
     assert "a.csv: row 100 has the time 1000000000 s, far ahead of the rows around it, and is left out." in said[0]
+
+
+def test_a_run_that_is_killed_in_its_first_piece_of_the_log_is_gone_on_with(tmp_path, monkeypatch):
+    log, out, state = (tmp_path / name for name in ("a.csv", "out.csv", "state"))
+    log.write_text(HEADER + "".join(f"{row}\n" for row in of_flight(100)))
+    request = publishing.Request(str(log), str(out), state=str(state))
+    recipe, said = Recipe(settings=FilterSettings(editing="live")), list[str]()
+
+    class Killed(BaseException):
+        """Nothing is closed, as nothing would be."""
+
+    monkeypatch.setattr(Live, "push", lambda self, *rows, **more: (_ for _ in ()).throw(Killed))
+    with pytest.raises(Killed):
+        publishing.follow_log(request, recipe, said.append)
+    monkeypatch.undo()
+    stop = Stop()
+    monkeypatch.setattr(publishing, "Stop", lambda: stop)
+    monkeypatch.setattr(sources.time, "sleep", lambda _seconds: stop._ask(signal.SIGTERM, None))
+    publishing.follow_log(request, recipe, said.append)
+    assert [line for line in said if "goes on after" in line]
+    assert pd.read_csv(out)["row"].tolist() == list(range(100))
