@@ -101,10 +101,10 @@ class _File(click.Path):
         return super().convert(value, parameter, ctx)
 
 
-#: The name of a file, which shells complete.
-FILE = _File()
+#: The name of a file, which shells complete. Whether it may be read shows when it is: of many, the others are done.
+FILE = _File(readable=False)
 #: The same, or nothing.
-RANGE = click.Path()
+RANGE = click.Path(readable=False)
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:

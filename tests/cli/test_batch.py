@@ -227,6 +227,22 @@ def test_a_pattern_leaves_truths_and_trajectories_out(run, logs):
     assert [line.split(":")[0] for line in result.out.splitlines()] == ["0.csv", "2.csv", "1.parquet", "3 logs"]
 
 
+def test_a_log_that_may_not_be_read_stops_no_other(run, logs, monkeypatch):
+    allowed, opened = os.access, Path.open
+
+    def open_allowed(path, *how, **more):
+        if path.name == NAMES[1]:
+            raise PermissionError
+        return opened(path, *how, **more)
+
+    monkeypatch.setattr(os, "access", lambda path, mode: str(path) != NAMES[1] and allowed(path, mode))
+    monkeypatch.setattr(Path, "open", open_allowed)
+    found = run(*BATCH)
+    assert found.code == 1
+    assert found.err == "ftproc: 1.parquet: no permission to read it.\n"
+    assert made(logs, {}) == ["0", "2"]
+
+
 def test_which_names_are_logs(here):
     for name in ("a.csv", "a.truth.csv", "b[1].csv"):
         (here / name).touch()
