@@ -13,6 +13,7 @@ from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
 from ftproc.files.reading import computed, converting, further, large, proposal, understanding
+from ftproc.files.reading.clocks import fractions
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
@@ -175,13 +176,13 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     table = header.load(wanted, [*chosen[len(wanted) :], *plan.others])
     if not table.num_rows:
         raise InputError(f"{header.source}: there are column names but no rows.")
+    table, zeros = fractions.restored(header, found["time"], table)
     kept, notes = _kept(plan, table, chosen)
     choosing.refuse_several(header, plan.extract, kept)
     converted = converting.converted(header, found, table.columns if kept is None else table.take(kept).columns)
-    known = converted.quantities, converted.found, converted.clock, plan.station, header.is_of_a_standard
     one_target = bool(plan.extract.target or header.stated.target)
     try:
-        judged = converting.judged(header.source, *known)
+        judged = converting.judged(header.source, *converted[:3], plan.station, header.is_of_a_standard)
     except InputError:  # rows of several targets have no motion that tells the units
         log = _in_time_order(header.source, converted.quantities, None)
         if not one_target:
@@ -209,7 +210,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
         several.refuse(header, judged.found, log)
     _refuse_apart(plan, log, QUANTITIES[1:])
     clock = converted.clock
-    notes = (*header.stated.notes, *notes, *converted.notes, *clock.notes, *spread, *over)
+    notes = (*header.stated.notes, *notes, *zeros, *converted.notes, *clock.notes, *spread, *over)
     if judged.found["time"].unit != converted.found["time"].unit:
         clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
     explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged)
@@ -250,13 +251,12 @@ def _explained(
     known = plan.header.is_of_a_standard or (log.heights is not None and "elevation" not in plan.found)
     names = [] if known else [name for index, name in enumerate(plan.header.names) if index not in beside]
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
-    doubtful = (*plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
-    words = (*notes, *doubtful)
+    words = (*notes, *plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
     axis = understanding.knows_axis(plan.station, plan.found)
     understood = understanding.describe(plan.header, plan.found, clock, station, words, axis, plan.beside)
     understood["assumed"] = [*judged.conditions, *understanding.assumed_of(plan.found)]
-    digest = plan.header.sha256()
-    return replace(log, remarks=(*remarks, *words), understood=understood, station=station, sha256=digest)
+    sha256 = plan.header.sha256()
+    return replace(log, remarks=(*remarks, *words), understood=understood, station=station, sha256=sha256)
 
 
 def _check_others(header: TableHeader, others: Iterable[int]) -> None:

@@ -124,11 +124,41 @@ def test_times_that_are_all_the_same_are_refused(log: Log) -> None:
         logs.read(path)
 
 
-def test_times_whose_fractions_lack_their_zeros(log: Log) -> None:
-    rows = [f"10:00:{k // 20:02d}.{50 * (k % 20)},{9000 + 2 * k},{30 + 0.01 * k},10" for k in range(200)]
-    read = logs.read(log("Time,Range (m),Az (deg),El (deg)", "\n".join(rows) + "\n"))
-    np.testing.assert_allclose(np.diff(read.time_s), 0.05, atol=1e-9)
+@pytest.mark.parametrize("head", ["Time", "Date,Time", "Hour,Min,Sec", "Time (s)", "utc", "Time (s);", "Date,SOD (s)"])
+@pytest.mark.parametrize(("rate", "step"), [(20, 50), (50, 20), (20, 5), (1, 1050)])
+def test_times_whose_fractions_lack_their_zeros(log: Log, head: str, rate: int, step: int) -> None:
+    """Of ms or hundredths, in texts and in numbers; with one in each second, by the digits alone."""
+    size = 100 if step == 5 else 1000
+    rows = []
+    for k in range(600):
+        second, part = divmod(k * step, size)
+        clock = f"10:{second // 60:02d}:{second % 60:02d}.{part}"
+        time = {"Time": clock, "Date,Time": f"2024-05-14,{clock}", "Hour,Min,Sec": clock.replace(":", ","),
+                "utc": clock.replace(":", ""), "Date,SOD (s)": f"2024-05-14,{36000 + second}.{part}"}  # fmt: skip
+        rows.append(f"{time.get(head, f'{36000 + second}.{part}')},{9000 + 2 * k},{30 + 0.01 * k},10")
+    text = "\n".join([f"{head.strip(';')},Range (m),Az (deg),El (deg)", *rows, ""])
+    path = log(*(text.replace(".", "_").replace(",", ";").replace("_", ",") if ";" in head else text).split("\n", 1))
+    read = logs.read(path)
+    np.testing.assert_allclose(np.diff(read.time_s), step / size, atol=1e-6)
     assert any("without their leading zeros" in remark for remark in read.remarks)
+
+
+@pytest.mark.parametrize("digits", ["{:.1f}", "{:.10g}", "{:.2f}"])
+@pytest.mark.parametrize("step", [0.1, 0.25, 0.125, 0.02, 1.05])
+def test_numbers_of_seconds_stay_as_they_are(log: Log, digits: str, step: float) -> None:
+    times = [float(digits.format(36000.5 + k * step)) for k in range(200)]
+    rows = "".join(f"{digits.format(time)},{9000 + 2 * k},{30 + 0.01 * k},10\n" for k, time in enumerate(times))
+    read = logs.read(log("Time (s),Range (m),Az (deg),El (deg)", rows))
+    assert not any("leading zeros" in remark for remark in read.remarks)
+
+
+@pytest.mark.parametrize("step", [1, 0.5])
+def test_a_few_fractions_say_nothing_of_zeros(log: Log, step: float) -> None:
+    """Nor do many that would be further out of order with more zeros."""
+    fractions = ["50", "125", "250", "375"] if step == 1 else ["125", "50"]
+    rows = [f"{int(k * step)}.{fractions[k % len(fractions)]},{9000 + 2 * k},{30 + 0.01 * k},10" for k in range(20)]
+    read = logs.read(log("Time (s),Range (m),Az (deg),El (deg)", "\n".join(rows) + "\n"))
+    np.testing.assert_array_equal(read.time_s, [float(row.split(",")[0]) for row in rows])
 
 
 @pytest.mark.parametrize("fractions", [["0", "5", "05", "50"], ["1", "2", "3", "4"], ["100", "200", "350", "400"]])

@@ -30,10 +30,6 @@ class Clock(NamedTuple):
     notes: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
 
-    def noting(self, note: str) -> Clock:
-        """The same with one more note; itself without one."""
-        return self._replace(notes=(*self.notes, note)) if note else self
-
 
 def unrolled(time_s: FloatArray, only: float | None = None) -> tuple[FloatArray, tuple[str, ...]]:
     """(n,) times in s, in file order and NaN where missing, without the restarts of their clock; and a note on each.

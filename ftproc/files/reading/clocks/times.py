@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.errors import InputError
 from ftproc.files import arrow, leap_seconds
 from ftproc.files.moments import NO_ZONE
-from ftproc.files.reading.clocks import fractions, notations, numeric, timecode
+from ftproc.files.reading.clocks import notations, numeric, timecode
 from ftproc.files.reading.clocks.clock import DAY_S, HOUR_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
@@ -59,8 +59,7 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
             counted_up = counted_up or timecode.read(text, origin, described)
             if counted_up is not None:
                 return counted_up
-            text, note = fractions.padded(text)
-            return _on_gps(stamped(text, origin).noting(note), described)
+            return _on_gps(stamped(text, origin), described)
         column = text
     return numeric.read(numbers(column, origin), described, origin.source)
 

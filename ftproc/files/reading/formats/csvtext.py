@@ -10,6 +10,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -53,13 +54,12 @@ def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> Ta
     name = room.name
     plain, language = ("", "") if widths else _unwrapped(data, room)
     data = plain.encode() if language else data
-    known = None if widths or language else _described(data, room)
-    if known is not None:
+    if not (widths or language) and (known := _described(data, room)) is not None:
         return known
     text = split(name, data, widths)
     text = text._replace(form=f"{language}, {text.form}" if language else text.form)
     commas = text.delimiter != "," or len(_QUOTED_COMMA.findall(text.body, 0, _HEAD)) > 2
-    return text.header(text.load, commas)
+    return text.header(lambda: text, commas)
 
 
 def _unwrapped(data: bytes, room: limits.Room, cut: bool = False) -> tuple[str, str]:
@@ -88,8 +88,8 @@ def _large_file(name: str, path: Path) -> TableHeader:
     head = split(name, content.read(name, path, limit=_HEAD), cut=True)
     _, note = trimming.cut_off(blocks.end(path, _HEAD), len(head.names), head.delimiter)
 
-    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
-        return split(name, content.read(name, path, known=before)).load(numeric, others)
+    def whole() -> CsvText:
+        return split(name, content.read(name, path, known=before))
 
     def in_blocks(numeric: Sequence[int]) -> Blocks | None:
         if head.encoding or note:  # in which the rows are elsewhere than in UTF-8, or end before the file
@@ -98,7 +98,7 @@ def _large_file(name: str, path: Path) -> TableHeader:
         bodies = blocks.of_file(path, head.source, head.body_offset, head.delimiter, before)
         return Blocks((head._replace(body=body, odd_quotes=False).load(numeric, ()) for body in bodies), rows)
 
-    return replace(head._replace(note=note).header(load, head.delimiter != ","), blocks=in_blocks)
+    return replace(head._replace(note=note).header(whole, head.delimiter != ","), blocks=in_blocks)
 
 
 class CsvText(NamedTuple):
@@ -123,16 +123,19 @@ class CsvText(NamedTuple):
     above: Sequence[str] = ()
     note: str = ""
 
-    def header(self, load: Callable[[Sequence[int], Sequence[int]], pa.Table], decimal_comma: bool) -> TableHeader:
-        known = TableHeader(self.source, self.names, load, decimal_comma, units=self.units, form=self.form)
-        return replace(known, above=self.above).noting(self.note)
+    def header(self, whole: Callable[[], CsvText], decimal_comma: bool) -> TableHeader:
+        known = TableHeader(
+            self.source, self.names, lambda numeric, others: whole().load(numeric, others), decimal_comma,
+            units=self.units, form=self.form, above=self.above, written=lambda k: whole().load([k], (), False)[0],
+        )  # fmt: skip
+        return known.noting(self.note)
 
-    def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
+    def load(self, numeric: Sequence[int], others: Sequence[int], as_numbers: bool = True) -> pa.Table:
         """Columns `numeric`, then `others`, by position.
 
-        The numeric ones are all float64, or all text if any of them has a cell that is not a number; the types of
-        the others are inferred. Raises InputError, naming the first row with too many or too few cells.
-        """
+        The numeric ones are all float64, or all text if any of them has a cell that is not a number, or not
+        `as_numbers`; the types of the others are inferred. Raises InputError, naming the first row with too many or too
+        few cells."""
         import pyarrow as pa
 
         if not re.search(rb"[^\r\n]", self.body):
@@ -141,10 +144,9 @@ class CsvText(NamedTuple):
             return self._of_widths([*numeric, *others])
         if self.odd_quotes:
             self._refuse_ragged()
-        try:
-            return self._parse(numeric, others, pa.float64())
-        except pa.ArrowInvalid:  # a word, a timestamp, a decimal comma, or rows that do not fit at all
-            pass
+        with suppress(pa.ArrowInvalid):  # a word, a timestamp, a decimal comma, or rows that do not fit at all
+            if as_numbers:
+                return self._parse(numeric, others, pa.float64())
         try:
             return self._parse(numeric, others, pa.binary())
         except pa.ArrowInvalid as error:
@@ -217,8 +219,8 @@ class CsvText(NamedTuple):
             hint = "Complete the row, or name the widths of the columns in characters, such as --widths 10,12,10,10."
         else:
             hint = "Complete the row or delete it."
-        cell = "cell" if len(cells) == 1 else "cells"
-        return f"{self.source}: {row_named(row)} has {len(cells)} {cell} where the header has {expected}. {hint}"
+        there = f"{len(cells)} cell{'s' * (len(cells) != 1)}"
+        return f"{self.source}: {row_named(row)} has {there} where the header has {expected}. {hint}"
 
 
 def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = False) -> CsvText:
@@ -243,8 +245,7 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
     odd = text.data.count(b'"', start) % 2 == 1
     separated = f"text, separated by {_SEPARATOR_NAMES[found.delimiter]}" if not widths else "text in fixed widths"
     form = ", ".join(part for part in (text.was and f"{text.was}", separated, found.form) if part)
-    offset = text.skipped + start
-    return found._replace(body=body, odd_quotes=odd, body_offset=offset, encoding=text.was, form=form)
+    return found._replace(body=body, odd_quotes=odd, body_offset=text.skipped + start, encoding=text.was, form=form)
 
 
 def _plain(data: bytes) -> tuple[list[str], str, int] | None:

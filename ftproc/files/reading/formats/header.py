@@ -50,7 +50,8 @@ class TableHeader:
     blocks: numeric positions -> these columns block by block if the file is large, else None.
     units: the cells of a row of units under the names, or nothing. above: the lines above the
     names. form: the kind of file and how it is laid out. stated: by the standard of the file. sha256: of the bytes of
-    the file, as it is stored; "" of a table in memory.
+    the file, as it is stored; "" of a table in memory. written: a position -> the cells of the column as they stand;
+    None where the file holds numbers.
     """
 
     source: str
@@ -64,6 +65,7 @@ class TableHeader:
     above: Sequence[str] = ()
     stated: Stated = _NOTHING
     sha256: Callable[[], str] = lambda: ""
+    written: Callable[[int], pa.ChunkedArray | None] = lambda index: None
 
     @property
     def is_of_a_standard(self) -> bool:

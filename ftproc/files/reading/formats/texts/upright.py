@@ -55,7 +55,8 @@ def _with(header: TableHeader, keys: Sequence[int], found: dict[str, list[str | 
         return pa.Table.from_arrays([pa.array(columns[k]) for k in chosen], names=[names[k] for k in chosen])
 
     form = f"{header.form}, a row for each quantity"
-    return replace(header, names=names, load=load, blocks=lambda numeric: None, units=(), form=form)
+    apart = replace(header, names=names, load=load, blocks=lambda numeric: None, units=(), form=form)
+    return replace(apart, written=lambda index: None)
 
 
 def _columns(
