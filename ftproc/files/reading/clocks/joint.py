@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 #: Days counted from: the count of 1970-01-01, and where counts lie. A Julian day begins at noon.
 _JULIAN = 2440587.5
 _DAY_COUNTS = ((25569, 3e4, 4.9e4), (40587, 5.5e4, 7e4), (_JULIAN, 2.4e6, 2.5e6))
+_SAME_S = 1.0  # between the same time in minutes and in seconds
 _SEVERAL_DATES = ("the date can be read in several ways, so it is left open",)
 
 
@@ -142,8 +143,16 @@ def _of_day_or_stamped(text: pa.ChunkedArray, origin: Origin, described: Column)
 
 
 def _parts_of_day(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> FloatArray:
-    hour, minute, second = (numbers(columns[role], origin) for role in ("hour", "minute", "second"))
-    return 3600 * hour + 60 * minute + second
+    """(n,) seconds of parts; of those that are the same time in two units, the seconds."""
+    sizes = {"hour": 3600.0, "minute": 60.0, "second": 1.0}
+    parts = {role: size * numbers(columns[role], origin) for role, size in sizes.items() if role in columns}
+    *others, last = parts.values()
+    if "hour" not in columns and np.nanmax(np.abs(others[0] - last), initial=0.0) < _SAME_S:
+        return last
+    if "second" in columns and (others[-1] % 60 > 0).any():
+        row = int(np.argmax(others[-1] % 60 > 0))
+        raise origin.bad_cell(row, f"{others[-1][row] / 60:.10g}", "a whole number of minutes")
+    return np.asarray(sum(others, last))
 
 
 def _dates(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> tuple[IntArray, bool]:

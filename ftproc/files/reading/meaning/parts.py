@@ -113,6 +113,9 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
 
     clock = [k for k, name in names.items() if name.stem in ALIASES["time"] and name.stem not in _ELAPSED]
     hms = {role: one(role) for role in ("hour", "minute", "second")}
+    in_two = {name.unit.lower(): k for k, name in names.items() if name.stem in ("time", "t") and name.unit}
+    for role in ("minute", "second") if len(in_two) == 2 else ():  # Time_min, Time_sec
+        hms[role] = next((k for unit, k in in_two.items() if unit in _TIME[role]), hms[role])
     if hms["second"] is None:  # SS.SSS
         hms["second"] = _only(names, lambda name: len(name.stem) > 1 and not name.stem.strip("s"))
     if hms["minute"] is None and hms["hour"] is not None and hms["hour"] + 1 in names:  # the second of two MM
@@ -140,8 +143,10 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
         days = {"date": date}
         of_day = _only({k: names[k] for k in names if k != date}, lambda name: unit_of_day(name) is not None)
         clock += [of_day] if not clock and None in hms.values() and of_day is not None else []
-    if None not in hms.values():
-        days |= {role: index for role, index in hms.items() if index is not None}
+    parts = {role: index for role, index in hms.items() if index is not None}
+    alone = not any(name.means("time") == 1 for k, name in names.items() if k not in parts.values())
+    if len(parts) == 3 or (len(parts) == 2 and "minute" in parts and alone):
+        days |= parts
     else:
         clock += [hms["second"]] if not clock and hms["second"] is not None and (days or fraction is not None) else []
         if not clock or not (days or fraction is not None):
