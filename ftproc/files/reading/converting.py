@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ftproc.files.moments import NO_ZONE
-from ftproc.files.reading.clocks import joint, numeric, times
+from ftproc.files.reading.clocks import joint, numeric, restarts, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import readings, schema
@@ -76,6 +76,9 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
         quantities[quantity] = each.column.unit.to_si(each.values)
         notes += each.notes
     notes += faces.turned_back(quantities, decided)
+    if "time" in quantities:
+        quantities["time"], turns = restarts.unwrapped(quantities, decided["time"].unit)
+        notes += turns
     return Converted(quantities, decided, clock, (*marks, *notes), readings.undecided(read_here))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.errors import InputError, quoted
+from ftproc.files.reading.clocks import restarts
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import names, rows, schema
 from ftproc.order_statistics import medians
@@ -71,6 +72,11 @@ def refuse(
             f'{header.source}: column "{column.name}" tells {count} targets apart ({shown}), whose rows alternate. '
             f"Say --target {quoted(f'{column.name}={first}')} for one, --target {quoted(column.name)} for a "
             "trajectory of each, or --target none if it is one target after all."
+        )
+    if mixed and (back := restarts.sessions(log)):
+        raise InputError(
+            f"{header.source}: the time {back}, and the rows from there on are on another track at the same times, as "
+            "in several sessions behind each other. Split the file there; if it is one session, write times that go on."
         )
     if mixed:
         split = threshold(log.measurement)
