@@ -71,8 +71,7 @@ def exports() -> Iterator[Animal]:
     yield _log("Fortran", "TIME RANGE AZ EL", F.t, [f"{r:.9E}".replace("E", "D") for r in F.r], F.a, F.e, separator=" ")
     above = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDate\t2024/05/31\n***End_of_Header***\t\n\n"
     head = f"{above}X_Value\tRange (m)\tAzimuth (deg)\tElevation (deg)\tComment"
-    said = {"asks": "--columns time=", "answer": {"columns": "time=X_Value"}, "options": NORTH}
-    yield _log("LabVIEW", head, F.t, F.r, DEG_A, [f"{e:.7f}\t" for e in DEG_E], separator="\t", **said)
+    yield _log("LabVIEW", head, F.t, F.r, DEG_A, [f"{e:.7f}\t" for e in DEG_E], separator="\t", options=NORTH)
     above = "#group,false,false,true,true,false,false,false\n#datatype,string,long,string,dateTime:RFC3339,double"
     head = (
         f"{above},double,double\n#default,_result,,,,,,\n,result,table,source,_time,range_m,azimuth_rad,elevation_rad"

@@ -10,7 +10,7 @@ from ftproc.errors import InputError
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content, documents
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, markup, meteors, nmea, tdm
+from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, lvm, markup, meteors, nmea, tdm
 from ftproc.files.reading.formats.texts import tagged, templated
 
 _HEAD = 1 << 16  # bytes in which a format is recognised
@@ -48,6 +48,7 @@ TEXTS = (
     _of("ILRS CRD", r"\A\s*(?:00 .*\n\s*)*[hH]1\s+CRD\b", crd.read),
     _of("FTPdetectinfo", r"\AMeteor Count *=", meteors.read),
     _of("NMEA 0183", r"^.{0,60}[$!][A-Z][A-Z0-9]{2,7},", nmea.read),
+    _of("LabVIEW measurement", r"\A\s*LabVIEW Measurement\b", lvm.read),
     _of("Leica GSI", r"\A\s*\*?\d\d[\d.]{4}[+-]\w{8}", gsi.read),
     _of("lines of several kinds", kinds.MARK, kinds.read),
     _no("GeoCOM", r"\A\s*%R1[QP],", "a dialogue with a total station (GeoCOM) without times; log the time before "
