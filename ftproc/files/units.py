@@ -105,7 +105,7 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
         "nmi": "nauticalmile nauticalmiles nautmile nautmiles nautmi nautical mn seemeile seemeilen millenautique "
         "millesnautiques millanáutica millasnáuticas migliomarino miglianautiche sjömil sømil zeemijl "
         "zeemijlen морскаямиля морскиемили мормили 海里",
-        "mi": "mile miles smi sm statutemile statutemiles",
+        "mi": "mile miles smi sm stmi statmi statutemi statutemile statutemiles usstatutemile usstatutemiles",
         "yd": "yds yard yards",
         "dmi": "datamile datamiles",
         "cable": "cables cbl cbls cablelength cablelengths kabellänge kabellängen encablure encablures каб кабельтов "
@@ -151,6 +151,8 @@ _FACTOR = re.compile(
     r"\s*(?:[x×*·]\s*)?(?P<unit>[^\W\d].*|[°º].*)",
     re.IGNORECASE,
 )
+_TENS = {"ten": 10, "hundred": 100, "thousand": 1000}
+_TENTHS = re.compile(rf"^\s*({'|'.join(_TENS)})(ths?)?s? (?:of )?(?:an? )?(?=\w)", re.IGNORECASE)  # tenths of a second
 
 
 def unit_named(quantity: str, word: str) -> Unit | None:
@@ -158,6 +160,7 @@ def unit_named(quantity: str, word: str) -> Unit | None:
     `100 ns`, `x1000 ft`, `1/128 s`, `10^-3 deg`. None if none."""
     if len(word) > _LONGEST_SPELT:
         return None
+    word = _TENTHS.sub(lambda of: f"{'1/' if of[2] else ''}{_TENS[of[1].lower()]} ", word)
     return _plainly_named(quantity, word) or _scaled(quantity, word.strip())
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.reading.meaning.wording import turned
 from ftproc.files.units import unit_named
-from ftproc.files.words import ALIASES, WEAK_ALIASES, ZENITH_ALIASES
+from ftproc.files.words import ALIASES, OF_TIMES, WEAK_ALIASES, ZENITH_ALIASES
 
 _SECONDS_OF_WEEK = frozenset(
     ["tow", "sow", "gpstow", "gpssow", "timeofweek", "secondsofweek", "secofweek", "itow", "gpsseconds", "weekseconds"]
@@ -190,6 +190,14 @@ def unit_of_day(name: Name) -> str | None:
     if found is None or not found["unit"] or unit_named("time", found["unit"]) is None:
         return None
     return found["unit"]
+
+
+def unit_alone(name: Name) -> str:
+    """The unit of a time that a name is, perhaps with words of when it counts from: `minutes since start`; or ""."""
+    units = {*_TIME["minute"][:2], *_TIME["hour"][:2], *FRACTIONS} - {"ms", "us", "ns"}
+    words = [word for word in (*name.words, name.unit.lower()) if word in units]
+    rest = {*name.words, name.unit.lower()} - {*words, ""}
+    return FRACTIONS.get(words[0], words[0]) if len(words) == 1 and OF_TIMES.issuperset(rest) else ""
 
 
 def unit_of_fraction(name: Name) -> str:

@@ -16,7 +16,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from ftproc.errors import InputError, nearest
+from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning import parts, questions, wording
@@ -267,6 +267,6 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
         raise InputError(
             f'{table.source}: the name of column "{column.name}" says {stated.name}, but --units says '
             f"{quantity}={unit}. Leave --units out for it, or insist with {answer(names, {quantity: fits[0]})} "
-            f"--units {quantity}={unit}."
+            f"--units {quoted(f'{quantity}={unit}')}."
         )
     return column

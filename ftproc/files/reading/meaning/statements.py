@@ -81,7 +81,9 @@ def by_counts(header: TableHeader) -> tuple[TableHeader, int, str] | None:
     apart = [taken_apart(name) for name in header.names]
     of_days = {k: "d" for k, name in enumerate(apart) if parts.is_day_of_year(name) and _goes_on(header, k, 0.0)}
     of_day = {k: unit or "d" for k, name in enumerate(apart) if (unit := parts.unit_of_day(name)) is not None}
-    for counted in (of_days, {k: unit for k, unit in of_day.items() if _goes_on(header, k, 0.0)}):
+    alone = {k: unit for k, name in enumerate(apart) if (unit := parts.unit_alone(name))}
+    growing = ({k: unit for k, unit in each.items() if _goes_on(header, k, 0.0)} for each in (of_day, alone))
+    for counted in (of_days, *growing):
         if len(counted) == 1:
             return header, *counted.popitem()
     counting = [k for k, name in enumerate(apart) if counts_frames(name) and _goes_on(header, k)]

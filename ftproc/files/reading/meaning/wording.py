@@ -114,6 +114,6 @@ def unheard(name: str, quantity: str) -> str:
     for inside in _BRACKETS.findall(compatible(name)):
         words = re.findall(r"[^\W\d_]+", plain_letters(inside))
         rest = [word for word in words if word not in known and not any(unit_named(q, word) for q in QUANTITIES)]
-        if rest and len(words) > 1:
+        if rest and len(words) > 1 and not any(unit_named(q, inside) for q in QUANTITIES):
             return str(inside).strip()
     return ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ _OTHER = {
     "range": (3e-4, ("m", "km", "mm")),
     "angle": (0.02, ("rad", "deg", "grad", "mil")),
 }
+_BEHIND_A_BAR = re.compile(r"/ ?(\d+) ?(\w+)$")  # t/10 s: multiples of 10 s, or tenths of one
 _SELDOM = 0.08  # times as likely as the other angles are mils, and parts of the unit that is stated
 _PARTS = {"rad": ("mrad",), "deg": ("arcmin",)}
 _NEVER = 1e-9  # but where a name is impossible
@@ -107,6 +109,9 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
     yield column.unit, 1.0
     if _is_sure(column) or (quantity == "time" and not log.numbered):
         return
+    if (behind := _BEHIND_A_BAR.search(column.name)) and column.unit.name == f"{behind[1]} {behind[2]}":
+        inverse = column.unit.divide * float(behind[1]) ** 2
+        yield Unit(f"1/{column.unit.name}", column.unit.multiply, inverse), 1.0
     prior, others = _OTHER[kind]
     if is_canonical(column):
         prior *= _CANONICAL if kind != "angle" else _NEVER
