@@ -145,14 +145,26 @@ _PREFIXES = {
 }
 _WITH_PREFIXES = ("m", "s", "rad", "deg", "gon", "grad", "turn", "arcsec")
 _LONGEST_SPELT = 80  # characters, factor and blanks included
-_NUMBER = r"(?:\d{1,9}(?:\.\d{0,20})?|\.\d{1,20})(?:e[+-]?\d{1,2})?"
+_NUMBER = r"(?:\d{1,10}(?:\.\d{0,20})?|\.\d{1,20})(?:e[+-]?\d{1,2})?"
 _FACTOR = re.compile(
     rf"(?:[x×*·]\s*)?(?:10(?:\^|\*\*)\(?(?P<power>[+-]?\d{{1,2}})\)?|(?P<of>{_NUMBER})(?:\s*/\s*(?P<by>{_NUMBER}))?)"
     r"\s*(?:[x×*·]\s*)?(?P<unit>[^\W\d].*|[°º].*)",
     re.IGNORECASE,
 )
 _TENS = {"ten": 10, "hundred": 100, "thousand": 1000}
-_TENTHS = re.compile(rf"^\s*({'|'.join(_TENS)})(ths?)?s? (?:of )?(?:an? )?(?=\w)", re.IGNORECASE)  # tenths of a second
+_TENTHS = re.compile(rf"^\s*({'|'.join(_TENS)})ths? (?:of )?(?:an? )?(?=\w)", re.IGNORECASE)  # tenths of a second
+_COUNTS = r"(?:encoder )?(?:counts?|ticks?|pulses|steps)"
+_TURN = r"(?:an? )?(?:full )?(?:turn|rev|revolution|circle|360 ?(?:deg|°))"
+_BITS = re.compile(
+    rf"(?:(?:bams?|{_COUNTS}(?: of)?)\W{{1,2}})?(?:(?P<bits>[1-3]?\d)[ -]?bits?(?: (?:bams?|encoder|{_COUNTS}))?"
+    rf"|2(?:\^|\*\*)(?P<power>[1-3]?\d) ?(?:{_COUNTS})? ?(?:per|/|to|in) ?{_TURN})|bams?[ -]?(?P<bam>\d\d)",
+    re.IGNORECASE,
+)
+_PER_TURN = re.compile(
+    rf"(?:{_COUNTS}\W{{1,2}})?(?P<many>\d{{3,10}}) ?(?:[cp]pr|(?:{_COUNTS})? ?(?:per|/|to|in) ?{_TURN})"
+    rf"|{_COUNTS}/{_TURN} ?= ?(?P<of>\d{{3,10}})",
+    re.IGNORECASE,
+)
 
 
 def unit_named(quantity: str, word: str) -> Unit | None:
@@ -160,8 +172,13 @@ def unit_named(quantity: str, word: str) -> Unit | None:
     `100 ns`, `x1000 ft`, `1/128 s`, `10^-3 deg`. None if none."""
     if len(word) > _LONGEST_SPELT:
         return None
-    word = _TENTHS.sub(lambda of: f"{'1/' if of[2] else ''}{_TENS[of[1].lower()]} ", word)
-    return _plainly_named(quantity, word) or _scaled(quantity, word.strip())
+    word = _TENTHS.sub(lambda of: f"1/{_TENS[of[1].lower()]} ", word)
+    counts = _BITS.fullmatch(word.strip()) or _PER_TURN.fullmatch(word.strip())
+    known = _plainly_named(quantity, word)
+    if counts and counts.lastgroup and not known and quantity in ("azimuth", "elevation"):  # of an encoder
+        number = int(counts[counts.lastgroup])
+        word = f"1/{2**number if counts.re is _BITS else number} turn"
+    return known or _scaled(quantity, word.strip())
 
 
 def _plainly_named(quantity: str, word: str) -> Unit | None:

@@ -193,21 +193,23 @@ NOT_UNITS = frozenset(
     rate dot sigma std err error bias res residual flag valid snr rcs ok quality id status type gate ref mps2
     mode sd var variance rms outlier velocity speed vel doppler acc cmd command commanded offset corr lag
     correction width beamwidth max min ground horizontal cov uncertainty idx index count no number code lock
-    signal power servo encoder counts raw true truth
+    signal power servo encoder enc counts raw true truth
     soll sollwert setpoint consigne
     filt filtered smooth smoothed pred predicted prediction sac sic cat category fl typ len trn tn
     """
     )
 )
 
+#: Words of columns that hold counts of an encoder.
+COUNTS = frozenset(_split("counts count cnt cnts ticks encoder encoders enc"))
+#: Words of a name with a unit that say nothing about the quantity.
+BESIDE_A_UNIT = QUALIFIERS | COUNTS
 
 #: Names of azimuths that count from the head of a ship, on land from the north of a grid; so do gunners and surveyors.
 AT_SEA = "gisement"
 
-#: Words of courses, which are the headings of a carrier or belong to the target.
+#: Words of courses, of a carrier or a target; and of speeds, with which a course may be that of a target.
 COURSES = frozenset(_split("course kurs rumbo rumo koers rota rotta route курс 航向"))
-
-#: Words of speeds, with which a course is that of a target as well as of a carrier.
 SPEEDS = frozenset(
     _split("speed velocity sog fahrt geschwindigkeit vitesse velocidad velocidade velocita snelheid fart скорость 航速")
 )

@@ -142,9 +142,7 @@ def asked() -> Iterator[Animal]:
                asks="--units 'range=0.5 m'",
                answer={"columns": "range=range_m", "units": {"range": "0.5 m"}})  # fmt: skip
     counts = [np.round(each / 360 * 2**24).astype(int) for each in (DEG_A, DEG_E)]
-    yield _log("counts of encoders", lines("time_s,range_m,az_counts,el_counts", F.t, R, *counts),
-               asks="--units 'azimuth=1/65536 turn'", answer={"columns": "azimuth=az_counts,elevation=el_counts",
-               "units": {"azimuth": "1/16777216 turn", "elevation": "1/16777216 turn"}})  # fmt: skip
+    yield _log("counts of encoders", lines("time_s,range_m,az_counts,el_counts", F.t, R, *counts))
     flights = fixed(2e6 * F.r / 299792458, 6)
     yield _log("times of flight", lines("time_s,tof_us,az_deg,el_deg", F.t, flights, A, E),
                asks="--units 'range=149.896229 m'",

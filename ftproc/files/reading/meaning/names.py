@@ -13,6 +13,7 @@ from ftproc.files.limits import LONGEST_NAME
 from ftproc.files.units import unit_named
 from ftproc.files.words import (
     ALIASES,
+    BESIDE_A_UNIT,
     EITHER_ANGLE,
     NOT_UNITS,
     OF_TIMES,
@@ -82,9 +83,7 @@ _VERTICAL = QUALIFIERS.union(ALIASES["elevation"], WEAK_ALIASES["elevation"]) - 
 #: Names of angles whose unit g is the gon, and not an acceleration.
 _OF_SURVEYORS = frozenset((*WEAK_ALIASES["azimuth"], "v", "vz", *ZENITH_ALIASES)) - {"z"}
 
-#: Notations in other words: of degrees, as digits, and of UTC in the Gregorian calendar.
-_ALSO = {"degmin": "ddmm", "degminsec": "ddmmss", "utcg": "utc"}
-
+_ALSO = {"degmin": "ddmm", "degminsec": "ddmmss", "utcg": "utc"}  # in other words; UTC in the Gregorian calendar
 #: How else it is written that azimuths count clockwise from north.
 EAST_OF_NORTH = re.compile(r"\+?\s*(?:E|east) (?:of|from) (?:due |true )?N(?:orth)?\b", re.IGNORECASE)
 #: Words in brackets that say from where bearings count.
@@ -130,7 +129,8 @@ class Name(NamedTuple):
 
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
-        words = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
+        idle = BESIDE_A_UNIT if self.unit else QUALIFIERS
+        words = [word for word in self.words if word.rstrip("0123456789") not in idle]
         if not _OF_QUANTITIES.isdisjoint(words):  # such as theta_az
             words = [word for word in words if word not in EITHER_ANGLE]
         return "".join(word for k, word in enumerate(words) if not (k and word in _OF_UTC)).rstrip("0123456789")

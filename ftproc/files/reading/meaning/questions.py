@@ -14,6 +14,7 @@ from ftproc.files.reading.meaning.wording import HORIZONTAL, counts_from, says_n
 from ftproc.files.units import LIGHT_MPS, UNITS, unit_named
 from ftproc.files.words import (
     ALIASES,
+    COUNTS,
     COURSES,
     EITHER_ANGLE,
     FRAMES,
@@ -25,7 +26,6 @@ from ftproc.files.words import (
     WEAK_ALIASES,
 )
 
-_COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
 _FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
 _GATES = re.compile(r"(?:range)?(?:gate|bin|cell)s?(?:no|nr|num|number|index)?")  # whole stems
 _BESIDE_V = {"range": "s", "azimuth": "h"}  # the slope distance and the horizontal angle of surveyors
@@ -233,8 +233,8 @@ def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str)
         there_and_back = f"'range={once / 2:.9g} m' (there and back; one way it is {once:.9g} m)"
         scale = f"'range={once:.9g} m'" if {"one", "oneway"} & words else there_and_back
         what = f"times of flight{'' if unit else ' in a unit that its name does not state'}"
-    elif quantity != "range" and words & _COUNTS and words & {each for each in ALIASES[quantity] if len(each) > 1}:
-        scale, what = f"'{quantity}=1/65536 turn' (16 bits) or '{quantity}=1/131072 turn' (17)", "counts of an encoder"
+    elif quantity != "range" and words & COUNTS and words & {each for each in ALIASES[quantity] if len(each) > 1}:
+        scale, what = f"'{quantity}=16 bit', or as many bits as it has", "counts of an encoder"
     elif quantity == "range" and _GATES.fullmatch(name.stem) and not name.unit:
         scale, what = "range=UNIT, where UNIT is the length of one, such as '15 m'", "numbers of range gates"
     else:

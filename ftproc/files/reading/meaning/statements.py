@@ -17,7 +17,8 @@ from ftproc.files.reading.meaning.numbers import as_text, parsed
 from ftproc.files.reading.meaning.preamble import GROUPS
 from ftproc.files.reading.meaning.questions import answer, counts_frames, refuse_frames
 from ftproc.files.units import unit_named
-from ftproc.files.words import ALIASES, DEPRESSIONS, QUANTITIES
+from ftproc.files.words import ALIASES, COUNTS, DEPRESSIONS, QUANTITIES
+from ftproc.order_statistics import quantile
 from ftproc.settings import Station
 
 _OF_UNITS, _VALUE = ("units", "unit", "uom", "einheit", "unité"), ("value", "val")  # how names of columns end
@@ -52,6 +53,7 @@ _MANY = re.compile(
     re.IGNORECASE,
 )
 _ONE = re.compile(r"(?<![\w.])(?P<worth>\.?\d[\d.eE/^*+-]*\s*(?:[^\W\d]\w*|°))(?!\s*[=:])")
+_STEP = 0.02  # of a turn, at most, from row to row, in counts of an encoder
 _COUNTDOWN = re.compile(
     r"(?:t|time)(?:to|till|until|before)\w+|(?:t|time)(?:minus|remaining|left)|countdown|remainingtime|tgo|ttg"
 )
@@ -146,7 +148,32 @@ def with_units_beside(header: TableHeader) -> TableHeader:
             )
         if known and known == cells and not units[fits[0]]:
             units[fits[0]] = known.pop()
+    if bits := _of_encoders(header, units):
+        header = header.noting(f"the azimuth turns at {2**bits}, so its counts are those of an encoder of {bits} bits")
     return replace(header, units=units) if any(units) else header
+
+
+def _of_encoders(header: TableHeader, units: list[str]) -> int:
+    """The bits of the encoder whose counts an azimuth is, by the number at which it turns; 0 of others. They become the
+    unit of both angles in counts."""
+    apart = [taken_apart(*each) for each in zip(header.names, units, strict=True)]
+    words = [re.findall(r"[^\W\d_]+", name.text.lower()) for name in apart]
+    bare = [k for k, name in enumerate(apart) if not name.unit and not COUNTS.isdisjoint(words[k])]
+    mine = {q: [k for k in bare if not set(ALIASES[q]).isdisjoint(words[k])] for q in QUANTITIES[2:]}
+    if len(mine["azimuth"]) != 1 or len(mine["elevation"]) > 1:
+        return 0
+    counts = parsed(as_text(header.load([], mine["azimuth"]).column(0)), header.decimal_comma)
+    counts = np.zeros(0) if counts is None else counts[np.isfinite(counts)]
+    if not counts.size or (counts % 1).any() or not 2**7 <= counts.max() < 2**32 or counts.min() < 0:
+        return 0
+    bits = int(counts.max()).bit_length()
+    steps = np.abs(np.diff(counts))
+    upper = float(np.mean(counts >= 2 ** (bits - 1)))
+    if not _STEP < upper < 1 - _STEP or quantile(steps, 0.9) > _STEP * 2**bits or steps.max() < (1 - _STEP) * 2**bits:
+        return 0
+    for k in (*mine["azimuth"], *mine["elevation"]):
+        units[k] = f"{bits} bit"
+    return bits
 
 
 def _before(name: str, endings: Sequence[str]) -> str | None:
