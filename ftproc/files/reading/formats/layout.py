@@ -43,6 +43,11 @@ _CALLED = re.compile(
     r"^\s*(?:columns?|fields?|names?|header)\s*[:=]\s*", re.IGNORECASE
 )  # before the names in a comment
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
+_TYPE = re.compile(  # how programs call those of their values
+    r"[#(\[<' ]*(?:(?P<number>float|double|real|single|u?int|integer|long|short|number|numeric|decimal)|string|str|text"
+    r"|(?:var)?char|object|datetime|timestamp|date|time|bool(?:ean)?)\d*[)\]>' ]*",
+    re.IGNORECASE,
+)
 
 
 class Layout(NamedTuple):
@@ -175,8 +180,8 @@ def _with_names(
         top -= 1
     units: list[str] = []
     index = top - 1
-    while index >= 0 and RULE.fullmatch(lines[filled[index]]):  # a rule under the names
-        index -= 1
+    while index >= 0 and (RULE.fullmatch(line := lines[filled[index]]) or _are_types(split(line, separator, widths))):
+        index -= 1  # a rule, or types of numbers, under the names
     over = [lines[number] for number in filled[: index + 1]]
     index = _above_comments(over, index, lambda line: _heading(line, separator, width, block, widths))
     if index >= 0:
@@ -217,6 +222,12 @@ def _with_names(
         units = units_stated(said, names)
     return Layout(found, first, separator, units, max(index, 0) if names is not None else top, names is not None, width,
                   row_of_units, said)  # fmt: skip
+
+
+def _are_types(cells: Sequence[str]) -> bool:
+    """Whether all cells are types of values, some of them of numbers: string, float64, (real)."""
+    found = [_TYPE.fullmatch(cell) for cell in cells]
+    return all(found) and any(each and each["number"] for each in found)
 
 
 def _above_comments(lines: Sequence[str], index: int, heading: Callable[[str], list[str] | None]) -> int:

@@ -80,18 +80,19 @@ _RANGE = re.compile(rb"(?m)^\s*\[(?:origin|station\.)")  # tables of a range fil
 _OTHERS = {
     ".toml": "this is a station file: ftproc filter LOG --config {name}",
     ".safetensors": "this is a correction model: ftproc filter LOG --model {name}",
-    ".html": "this is a page; name the log it was made of: ftproc filter LOG --report {name}",
+    **dict.fromkeys((".html", ".htm"), "this is a page; save the table in it as .csv, or name the log that a report "
+                    "was made of: ftproc filter LOG --report {name}"),
     ".kml": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
     ".geojson": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
     ".czml": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
     **dict.fromkeys((".ods", ".numbers"), "this spreadsheet is not understood; save it as .xlsx or .csv"),
-    **dict.fromkeys((".htm", ".pdf", ".doc", ".docx", ".rtf"), "this is a document; save the table in it as .csv"),
+    **dict.fromkeys((".pdf", ".doc", ".docx", ".rtf"), "this is a document; save the table in it as .csv"),
     **dict.fromkeys(
         (".db", ".sqlite", ".bag", ".db3", ".mcap", ".tdms", ".mf4", ".mdf", ".pkl", ".pickle", ".7z", ".rar"),
         "this kind of file is not understood; export the track to .csv, .parquet, .xlsx, .h5 or .mat",
     ),
-    ".xls": "this is an old Excel workbook; save it as .xlsx or .csv",
-}
+}  # fmt: skip
+_OLD_WORKBOOK = b"\xd0\xcf\x11\xe0"  # a .xls that begins otherwise is a text
 
 
 def read_header(source: Source, widths: Sequence[int] = ()) -> TableHeader:
@@ -163,6 +164,8 @@ def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) 
     if other is not None:
         raise InputError(f"{name}: {other.format(name=name)}.")
     head = content.read(name, path, limit=8)
+    if lower.endswith(".xls") and head.startswith(_OLD_WORKBOOK):
+        raise InputError(f"{name}: this is an old Excel workbook; save it as .xlsx or .csv.")
     packed = packing.ending(path.name, head)
     if packed is not None:
         if deep > _DEEPEST:

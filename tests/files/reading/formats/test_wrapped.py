@@ -95,6 +95,14 @@ def test_a_table_in_another_language_is_read(make: Make, text: str) -> None:
     np.testing.assert_allclose(log.measurement, np.column_stack([R, A, E]), atol=1e-5)
 
 
+@pytest.mark.parametrize("kind", [name for name in TEXTS if "HTML" in name.upper()])
+def test_a_text_may_be_called_a_workbook(make: Make, kind: str) -> None:
+    """As programs call a page that a spreadsheet is to open; the bytes tell."""
+    np.testing.assert_allclose(logs.read(make(TEXTS[kind], "log.xls")).time_s, T, atol=1e-6)
+    assert "this is an old Excel workbook" in refused(make(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "log.xls"))
+    assert "save the table in it as .csv" in refused(make(TEXTS[kind], "log.htm"))
+
+
 def test_what_is_left_of_other_languages_is_refused(make: Make) -> None:
     two = each("INSERT INTO a VALUES ({0}, {1}, {2}, {3});\nINSERT INTO b VALUES ({0}, {1}, {2}, {3});")
     for text in (two, "z = [\n" + each("{0} {1} {2} {3};")):

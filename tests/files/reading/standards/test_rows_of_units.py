@@ -66,3 +66,16 @@ def test_a_workbook_has_metres_beside_degrees_too(make: Make) -> None:
     path = make("", "log.xlsx")
     book.save(path)
     np.testing.assert_allclose(logs.read(path).measurement, np.transpose([R, A, E]), rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "types", ["string float float float", "float64 float64 float64 float64", "(TIMESTAMP) (REAL) (REAL) (REAL)",
+              "datetime Double Double Double", "#text number number number"],
+)  # fmt: skip
+@pytest.mark.parametrize("head", ["time_s,range_m,az_deg,el_deg", "UTC,Range (m),Azimuth (deg),Elevation (deg)"])
+def test_a_row_of_types_is_no_row_of_names_or_units(make: Make, types: str, head: str) -> None:
+    columns = (CELLS["UTC" if "UTC" in head else "Time"], CELLS["Slant Range"], CELLS["Azimuth"], CELLS["Elevation"])
+    lines = [head, ",".join(types.split()), *map(",".join, zip(*columns, strict=True))]
+    log = logs.read(make("\n".join(lines) + "\n"))
+    np.testing.assert_allclose(np.diff(log.time_s), np.diff(T), atol=1e-3)
+    np.testing.assert_allclose(log.measurement, np.transpose([R, A, E]), rtol=0, atol=1e-3)
