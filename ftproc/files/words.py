@@ -158,7 +158,8 @@ GERMAN = frozenset(
 ZENITH_ALIASES = _split(
     """
     z vz zenith zenithangle zenithdistance zen zd za zendist zenang zenithdist zenit zenitdistanz zenitwinkel
-    coelevation coelevationangle offzenithangle offzenith colatitude зенитноерасстояние 天顶距
+    coelevation coelevationangle offzenithangle offzenith colatitude zenithal zenithale zenital zenitale cenital
+    zenitalna zenitalny zenitavstand zenithoek zenithafstand зенитноерасстояние зенитныи 天顶距 天頂距 天顶角 天頂角
     """
 )
 
@@ -181,7 +182,7 @@ QUALIFIERS = frozenset(
         """
     measured meas raw obs observed target tgt track trk radar sensor tracker polar value angle reading laser
     instrument theodolite anchor aoa rot rotor rotator antenna ant the true los look to from corrected station angular
-    actual act ist istwert gemessen mesure mesuree medido medida misurato
+    actual act ist istwert gemessen mesure mesuree medido medida misurato angulo angolo kat угол
     """
     )
 ).union(TRUE)
@@ -274,7 +275,6 @@ MISSING_WORDS = (
 )
 
 _LETTERS = str.maketrans({"ł": "l", "ı": "i", "ø": "o", "đ": "d", "æ": "ae", "ß": "ss"})  # that have no parts
-
 
 #: Words in brackets behind a name that change nothing, beside units and what the name itself may say.
 HARMLESS = frozenset(

@@ -44,6 +44,7 @@ _COUNTS = re.compile(
     re.IGNORECASE,
 )
 _FUNCTION = re.compile(r"(?:sin|cos|tan|log|ln|sqrt)\s*\(", re.IGNORECASE)
+_INITIALS = re.compile(r"(?<![\w.])([^\W\d_])\. ?([^\W\d_])\.(?!\w)")  # z. d.
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _EASTERN, _LONGEST_UNIT = "\u2e80", 4  # letters from here on stand before a unit without a blank; of its letters
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
@@ -79,15 +80,14 @@ NOTATIONS = frozenset(
 )
 
 #: Words beside that of the zenith.
-_VERTICAL = QUALIFIERS.union(ALIASES["elevation"], WEAK_ALIASES["elevation"]) - {"e", "alt", "altitude"}
-#: Names of angles whose unit g is the gon, and not an acceleration.
-_OF_SURVEYORS = frozenset((*WEAK_ALIASES["azimuth"], "v", "vz", *ZENITH_ALIASES)) - {"z"}
+_VERTICAL = QUALIFIERS.union(ALIASES["elevation"], *WEAK_ALIASES.values()) - {"e", "alt", "altitude"}
+_OF_SURVEYORS = frozenset((*WEAK_ALIASES["azimuth"], "v", "vz", *ZENITH_ALIASES)) - {"z"}  # whose unit g is the gon
 
 _ALSO = {"degmin": "ddmm", "degminsec": "ddmmss", "utcg": "utc"}  # in other words; UTC in the Gregorian calendar
 #: How else it is written that azimuths count clockwise from north.
 EAST_OF_NORTH = re.compile(r"\+?\s*(?:E|east) (?:of|from) (?:due |true )?N(?:orth)?\b", re.IGNORECASE)
-#: Words in brackets that say from where bearings count.
-_SENSES = TRUE.union(*(words for words, _, _ in TURNED.values()))
+_SENSES = TRUE.union(*(words for words, _, _ in TURNED.values()))  # in brackets: from where bearings count
+_SHORT = _SENSES.union(ZENITH_ALIASES)  # before a point that parts no path
 
 
 class Name(NamedTuple):
@@ -144,7 +144,7 @@ class Name(NamedTuple):
 
     def is_in_a_unit_of(self, quantity: str) -> bool:
         """Whether its unit, or a notation of degrees, is one of the quantity."""
-        packed = quantity in QUANTITIES[2:] and "dd" in self.notation
+        packed = "dd" in self.notation and quantity in QUANTITIES[2:]
         return packed or bool(self.unit and unit_named(quantity, self.unit))
 
 
@@ -154,7 +154,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if max(len(text), len(unit)) > LONGEST_NAME:
         return Name(text, "", ())
     plain = compatible(text).strip().strip("\"'#%;!:").strip()
-    plain = EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
+    plain = _INITIALS.sub(r"\1\2", EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain))))
     if _is_a_clock(plain) or _FUNCTION.match(plain):
         return Name(text, _squeezed(plain), (_squeezed(plain),), foreign=not _is_a_clock(plain))
     *_, days = None, *_DAYS.finditer(plain)
@@ -286,7 +286,7 @@ def _without_in(text: str) -> str:
 
 def _words(text: str) -> tuple[str, tuple[str, ...]]:
     """Stem and words of the last part of a path such as `CAT048.I040.RHO`; `Rel. Bearing` is none."""
-    text = re.sub(r"(?<!\w)(\w+)\.\s+", lambda of: of[1] + " " if plain_letters(of[1]) in _SENSES else of[0], text)
+    text = re.sub(r"(?<!\w)(\w+)\.\s+", lambda of: of[1] + " " if plain_letters(of[1]) in _SHORT else of[0], text)
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     parts = _NOT_WORDS.split(last.lower())
     around = set(_NOT_WORDS.split(context.lower())) - {""}
