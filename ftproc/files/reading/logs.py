@@ -13,7 +13,7 @@ from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
 from ftproc.files.reading import computed, converting, further, large, proposal, understanding
-from ftproc.files.reading.clocks import fractions
+from ftproc.files.reading.clocks import fractions, restarts
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
@@ -254,7 +254,7 @@ def _explained(
     words = (*notes, *plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
     axis = understanding.knows_axis(plan.station, plan.found)
     understood = understanding.describe(plan.header, plan.found, clock, station, words, axis, plan.beside)
-    understood["assumed"] = [*judged.conditions, *understanding.assumed_of(plan.found)]
+    understood["assumed"] = [*judged.conditions, *understanding.assumed_of(plan.found), *restarts.assumed(log)]
     sha256 = plan.header.sha256()
     return replace(log, remarks=(*remarks, *words), understood=understood, station=station, sha256=sha256)
 

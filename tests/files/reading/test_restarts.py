@@ -74,3 +74,41 @@ def test_minutes_that_are_no_part_are_asked_about(make: Make) -> None:
 def test_columns_beside_a_time_are_no_parts_of_it(make: Make, head: str, cells: str) -> None:
     log = logs.read(make(text(head, [f"{t:.1f},{cells}" for t in FLIGHT.t.tolist()])))
     np.testing.assert_allclose(log.time_s, FLIGHT.t, atol=1e-9)
+
+
+def moved(how: str) -> tuple[list[float], list[str]]:
+    """Times and readings of a flight, out of order."""
+    times, order = np.array(FLIGHT.t), np.arange(len(FLIGHT.t))
+    if how == "neighbours change places":
+        order = np.minimum(order ^ 1, len(order) - 1)
+    elif how == "blocks change places":
+        order = np.concatenate([np.array_split(order, 6)[k] for k in (3, 0, 5, 1, 4, 2)])
+    elif how == "the last first":
+        order = order[::-1]
+    elif how.startswith("wrong times"):
+        wrong = np.random.default_rng(3).permutation(len(times))[: int(how[-4:-2]) * len(times) // 100]
+        times[wrong] = times[np.roll(wrong, 1)]
+    else:  # of a clock that restarts in a gap
+        order = order[(order < 300) | (order > 420)]
+        times = (times + 30) % 65.536
+    return times[order].tolist(), [READINGS[k] for k in order.tolist()]
+
+
+@pytest.mark.parametrize(
+    ("how", "share"),
+    [
+        ("neighbours change places", ""),
+        ("blocks change places", ""),
+        ("the last first", "100 %"),
+        ("wrong times of 01 %", ""),
+        ("wrong times of 10 %", "10 %"),
+        ("a restart in a gap", "38 %"),
+    ],
+)
+def test_many_rows_out_of_order_are_a_condition_unless_the_readings_agree(make: Make, how: str, share: str) -> None:
+    times, readings = moved(how)
+    log = logs.read(make(text("time_s", [f"{time:.3f}" for time in times], readings)))
+    found = [each for each in log.understood["assumed"] if "out of order" in each]
+    expected = [f"the times are right, by which {share} of the rows are out of order"] if share else []
+    assert found == expected
+    assert log.rows_out_of_order > 0

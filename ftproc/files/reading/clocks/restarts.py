@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -17,6 +18,7 @@ _BITS, _USUAL_BITS = range(8, 41), (16, 32)  # of counters in the unit of the co
 _STEPS = 20  # of the usual ones in a period, at least
 _LONGER = 2.0  # times a long step, for one over a restart
 _ROWS = 24  # from one session to the next
+_MANY = 0.02  # of the rows; fewer are edited as outliers if their times are wrong
 _FURTHER = 3.0  # times a long way from row to row, for that over a restart
 
 
@@ -64,6 +66,33 @@ def sessions(log: MeasurementLog) -> str:
         return ""
     at = falls[0]
     return f"goes back from {time_s[at]:.10g} s to {time_s[at + 1]:.10g} s at {row_named(int(row[at + 1]))}"
+
+
+def assumed(log: MeasurementLog) -> list[str]:
+    """The condition of a log of which many rows would have to move to be in time order, unless the readings change less
+    from row to row in that order than in that of the file."""
+    if not log.rows_out_of_order:
+        return []
+    order = np.argsort(log.row, kind="stable")
+    in_file = log.measurement[order]
+    in_order: list[float] = []  # the longest row of times that do not decrease has as many
+    for time in log.time_s[order].tolist():
+        k = bisect.bisect(in_order, time)
+        in_order[k : k + 1] = [time]
+    share = 1 - len(in_order) / len(order)
+    if share <= _MANY:
+        return []
+    used = np.flatnonzero(np.isfinite(in_file).any(0)).tolist()
+    shorter = sum(_way(log.measurement[:, k], k) < _way(in_file[:, k], k) for k in used)
+    if shorter > len(used) / 2:
+        return []
+    return [f"the times are right, by which {100 * share:.0f} % of the rows are out of order"]
+
+
+def _way(values: FloatArray, component: int) -> float:
+    """How far (n,) readings go from row to row, in all."""
+    step = np.diff(values[np.isfinite(values)])
+    return float(np.abs((step + np.pi) % (2 * np.pi) - np.pi if component == 1 else step).sum())
 
 
 def _go_on(quantities: Mapping[str, FloatArray], row: IntArray, falls: NDArray[np.intp]) -> bool:
