@@ -104,16 +104,30 @@ def gains(
 ) -> FloatArray:
     """(2, m + 1, m + 1) how much likelier the log becomes with a curve of one and of TERMS terms in a channel, from one
     of the edges (m + 1,) to another."""
-    m, t = len(edges) - 1, setting.time_s - setting.time_s[0]
+    t = setting.time_s - setting.time_s[0]
     powers = np.vander(2 * t / max(t[-1], 1e-300) - 1, TERMS, increasing=True)
-    said = said_of(log, model, starts, _cells(setting, channel, edges, powers))
-    return _from_cells(said.score.reshape(m, TERMS), said.information.reshape(m, TERMS, m, TERMS))
+    return gains_by(log, model, starts, setting, channel, edges, powers)
+
+
+def gains_by(
+    log: Observations,
+    model: Model,
+    starts: list[Start],
+    setting: Setting,
+    channel: tuple[int, int],
+    edges: IntArray,
+    terms: FloatArray,
+) -> FloatArray:
+    """The same with the first and with all terms (n, k) of any curve."""
+    m, k = len(edges) - 1, terms.shape[1]
+    said = said_of(log, model, starts, _cells(setting, channel, edges, terms))
+    return _from_cells(said.score.reshape(m, k), said.information.reshape(m, k, m, k))
 
 
 def _from_cells(score: FloatArray, information: FloatArray) -> FloatArray:
-    """The gains, from the scores (m, TERMS) and the information (m, TERMS, m, TERMS) of the cells."""
-    m = len(score)
-    total, both = np.zeros((m + 1, TERMS)), np.zeros((m + 1, m + 1, TERMS, TERMS))
+    """The gains, from the scores (m, k) and the information (m, k, m, k) of the cells."""
+    m, terms = score.shape
+    total, both = np.zeros((m + 1, terms)), np.zeros((m + 1, m + 1, terms, terms))
     total[1:] = score.cumsum(0)
     both[1:, 1:] = information.transpose(0, 2, 1, 3).cumsum(0).cumsum(1)
     upper = np.triu_indices(m + 1, 1)
@@ -121,7 +135,7 @@ def _from_cells(score: FloatArray, information: FloatArray) -> FloatArray:
     s = total[high] - total[low]
     i = both[high, high] + both[low, low] - both[low, high] - both[high, low]
     scale = np.sqrt(np.maximum(np.einsum("kii->ki", i), 1e-300))
-    s, i = s / scale, i / scale[:, :, None] / scale[:, None, :] + 1e-9 * np.eye(TERMS)
+    s, i = s / scale, i / scale[:, :, None] / scale[:, None, :] + 1e-9 * np.eye(terms)
     found = np.zeros((2, m + 1, m + 1))
     found[0][upper] = 0.5 * s[:, 0] ** 2
     found[1][upper] = 0.5 * (s * np.linalg.solve(i, s[:, :, None])[:, :, 0]).sum(1)
