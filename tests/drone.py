@@ -1,5 +1,6 @@
 """What instruments see that read seldom: a total station of a drone, which is agile, and a laser ranger whose angles
-have stamps of their own; an aircraft that holds, whose turns are short and far apart; and a glider that circles."""
+have stamps of their own; an aircraft that holds, whose turns are short and far apart; one that weaves on its way to or
+from the instrument; a mount that has just locked on; and a glider that circles."""
 
 from __future__ import annotations
 
@@ -20,6 +21,7 @@ PLACE = np.array([200.0, 60.0, 0.0])  # m
 FAR = np.array([9000.0, 4000.0, 500.0])
 LASTS_S = 240.0
 LEG_S, TURN_S = 400.0, 60.0  # of an aircraft that holds
+LOCKING_S, SWINGS = 8.0, (80.0, 60.0)  # that a mount swings when it has locked on, and by sigmas of its angles
 
 
 def seen(seed: int, dt_s: float, sigma: tuple[float, ...]) -> tuple[MeasurementLog, FloatArray]:
@@ -35,6 +37,31 @@ def apart(seed: int, dt_s: float, late_s: float) -> tuple[MeasurementLog, FloatA
     log.measurement[0::2, 1:] = np.nan
     log.measurement[1::2, 0] = np.nan
     return log, position
+
+
+def locked(seed: int, dt_s: float) -> tuple[MeasurementLog, FloatArray]:
+    """A log of a hundred seconds of a light aircraft, 1 m and 0.1 mrad, whose mount has just locked on: both angles
+    swing to and fro twice, and come to rest. And the true positions (n, 3) m."""
+    time = np.arange(0.0, 100.0, dt_s)
+    log, position = read(CRUISER, FAR, time, (1.0, 1e-4, 1e-4), seed)
+    on = time < LOCKING_S
+    phase = 4 * np.pi * time[on] / LOCKING_S + np.random.default_rng([seed, 2]).uniform(0, 2 * np.pi)
+    swings = np.stack([np.cos(phase), np.sin(phase)], 1) * np.exp(-4 * time[on] / LOCKING_S)[:, None]
+    log.measurement[on, 1:] += 1e-4 * np.array(SWINGS) * swings
+    return log, position
+
+
+def weaving(seed: int, dt_s: float) -> tuple[MeasurementLog, FloatArray]:
+    """A log of two minutes of an aircraft that flies straight to the instrument or away from it, 3 m and 0.2 mrad, and
+    weaves for a third of them, which shows in azimuth alone. And the true positions (n, 3) m."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 120.0, dt_s)
+    along = 18e3 - 130 * time if seed % 2 else 2e3 + 130 * time
+    width_m = rng.uniform(10, 140)
+    turn_s = 4 + width_m / 10
+    swings = np.clip(np.minimum(time - 40, 80 - time) / 3, 0, 1) * np.sin(2 * np.pi * time / turn_s)
+    position = np.column_stack([along, 800 + width_m * swings, np.full(len(time), 900.0)])
+    return _noisy(position, time, (3.0, 2e-4, 2e-4), rng), position
 
 
 def holding(seed: int, dt_s: float, lasts_s: float) -> tuple[MeasurementLog, FloatArray]:

@@ -32,8 +32,10 @@ DRONES = {"1": (0.02, 3e-5, 3e-5), "0.5": (0.005, 1e-5, 1e-5), "0.2": (0.002, 1e
 #: Seconds between the ranges of an instrument, and from each to the angles that belong to it.
 APART = {"5": 0.006, "0.5": 0.001}
 GAPS = (9, 11, 43, 57)  # flights with gaps
+LOCKED = ("0.1/301", "0.1/305", "0.2/302")  # seconds between readings while a mount that has locked on swings
+WEAVING = ("0.2/301", "0.2/306", "0.2/308")  # of an aircraft that weaves on its way to or from the instrument
 COARSE, OFF = ("2", "4"), 0.05  # sigmas to which a glider's readings are rounded, and share of outliers among them
-WAVES = ("sine/36", "sine/42", "sine/54")  # patches of hard flights that go to and fro
+WAVES = ("sine/8", "sine/9", "sine/36", "sine/42", "sine/54")  # patches of hard flights that go to and fro
 HELD_S = 1200.0  # of an aircraft that holds, at 10 Hz
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 
@@ -62,6 +64,7 @@ def names() -> list[str]:
     slow += [f"holding/0.1/{seed}" for seed in (*SEEDS, 404)]  # of which one seems to have three times its noise,
     slow += [f"soaring/1/{seed}" for seed in (78, *SEEDS)]  # and of these one to be off in its circles
     slow += [f"coarse/{step}/{seed}" for step in COARSE for seed in SEEDS]
+    slow += [*(f"locked/{what}" for what in LOCKED), *(f"weaving/{what}" for what in WEAVING)]
     waves = [f"gaps/all/{number}" for number in GAPS] + [f"hard/{what}" for what in WAVES]
     fused = [f"range/{name}/{seed}" for name in RANGES for seed in SEEDS]
     samples = [f"sample/{path.name}/0" for path in sorted(SAMPLES.iterdir()) if _is_log(path)]
@@ -140,6 +143,16 @@ def _coarse(what: str, seed: int, room: Path) -> Seen:
     return Seen(drone.coarse(log, float(what), OFF, seed), log.time_s, position_m)
 
 
+def _locked(what: str, seed: int, room: Path) -> Seen:
+    log, position_m = drone.locked(seed, float(what))
+    return Seen(log, log.time_s, position_m)
+
+
+def _weaving(what: str, seed: int, room: Path) -> Seen:
+    log, position_m = drone.weaving(seed, float(what))
+    return Seen(log, log.time_s, position_m)
+
+
 def _gaps(what: str, seed: int, room: Path) -> Seen:
     found = hard_flights.with_gaps(seed).simulated
     return Seen(found.log, found.truth.time_s, found.truth.position_m)
@@ -170,6 +183,8 @@ _MAKERS: dict[str, Callable[[str, int, Path], Seen]] = {
     "holding": _holding,
     "soaring": _soaring,
     "coarse": _coarse,
+    "locked": _locked,
+    "weaving": _weaving,
     "gaps": _gaps,
     "range": _range,
 }

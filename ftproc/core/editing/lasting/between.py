@@ -24,13 +24,16 @@ from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import Scanned, in_whole, weighed_on, worth
 from ftproc.core.editing.lasting.screen import ELEVATED, leaves_curves, may_leave_curves, others_as_usual
+from ftproc.core.editing.lasting.waves import is_of_the_target, likeliest_wave, moved, sharper_wave
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.profile import pieces
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
 TERMS, PER_TERM = (5, 2, 8, 12, 22, 48), 4  # of a curve, and samples for each at least
-MANY = 22  # of a curve that a screen looks for
+SCREENED = 22  # of a curve that a screen looks for
+FEW, MANY, WAVE = range(3)  # terms of curves, or one rate, that are sought where a patch may have been followed
+SHARPENED = 2  # times that a wave is sought again by what was found
 TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
 FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed
 OF_EITHER = 2  # of those that leave nothing where they begin and end: from jump to jump, and by the process noise
@@ -95,6 +98,14 @@ def agile(seen: Scanned) -> list[list[Between]]:
     return [[each] for each in (*at_jumps[:OF_EITHER], *between_knots(seen.scene))]
 
 
+def swinging(seen: Scanned) -> list[list[Between]]:
+    """Where a wave of which less shows may have been followed: from one such stretch to another, and in both angles of
+    a mount that has just locked on."""
+    alone, pairs = between_knots(seen.scene), between_knots(seen.scene, 2)
+    azimuths = (each for each in (*alone, *pairs) if each.component == 1 and each.begin == 0)
+    return [*([each] for each in pairs), *([each, each._replace(component=2)] for each in azimuths)]
+
+
 def between_runs(scene: Scene, jumps: Sequence[Jump], within: int) -> list[Between]:
     """The stretches of a component from one rejected run to another, at one of which it jumps; the shortest first."""
     found = list[tuple[int, Between]]()
@@ -124,14 +135,16 @@ def between_jumps(
     return [each for _, each in sorted(found, key=lambda of: -of[0])][:MOST]
 
 
-def between_knots(scene: Scene) -> list[Between]:
-    """The stretches in which the process noise is far above what is usual, of each component; those where it is most
-    first."""
+def between_knots(scene: Scene, runs: int = 1) -> list[Between]:
+    """The stretches in which the process noise is far above what is usual, or from one to another of two runs of such
+    stretches, of each component; those where it is most first."""
     own, n, found = scene.own, len(scene.possible), list[tuple[float, Between]]()
     if own is None or scene.fixed:
         return []
     above, knot = own.jerk[:, 0] / scene.at_median.jerk[0, 0], pieces(scene.log.time_s, own)
-    for a, b in runs_of(above > ELEVATED).tolist():
+    elevated = runs_of(above > ELEVATED).tolist()
+    for from_to in itertools.combinations(elevated, runs):
+        a, b = from_to[0][0], from_to[-1][1]
         begin, end = np.searchsorted(knot, (a, b)).tolist()
         width = (end - begin) // (b - a)
         if PER_TERM * TERMS[0] <= end - begin <= LONGEST * n:
@@ -174,39 +187,40 @@ def likeliest_followed(seen: Scanned) -> Found | None:
     if len(seen.scene.rates) > 1:
         return None
     found, n, work = list[Found](), seen.samples, seen.scene.work
-    scene, tried = seen.scene._replace(work=work and work.apart), list[list[list[Curve]]]()
+    scene, tried = seen.scene._replace(work=work and work.apart), list[tuple[list[list[Curve]], int]]()
 
     @functools.cache
     def without(begin: int, end: int, taken_in: bool) -> Weighed:
         part = scene.part(slice(begin, end))
         return weighed(part, part.taken_in if taken_in else part.log.weight, ())
 
-    waves = agile(seen)
-    for stretches in [*followed(seen), *waves]:
+    ways = (FEW, followed(seen)), (MANY, agile(seen)), (WAVE, swinging(seen))
+    for way, stretches in ((way, each) for way, several in ways for each in several):
         if not worth(scene):
             break
         near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
         part, at_jumps = scene.stretch(near), [each.at_jumps(seen.jumps) for each in stretches]
         ends = [[curve.within(near) for curve in of_terms(each, TERMS[0])] for each in (stretches, at_jumps)]
-        if ends in tried:
+        if (ends, way) in tried:
             continue
-        tried.append(ends)
+        tried.append((ends, way))
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
-            span = near.start, near.stop
-            if stretches in waves:
-                first = of_many_terms(part, ends[0], partial(without, *span, False))
+            span, least = (near.start, near.stop), odds.ONE_END if way == FEW else odds.SURE
+            usual = partial(without, *span, False)
+            if way == FEW:
+                first = of_few_terms(part, ends, least, seen.prior(ends[0]), usual)
             else:
-                first = of_few_terms(part, ends, odds.ONE_END, seen.prior(ends[0]), partial(without, *span, False))
-            if first is None:
+                first = (of_many_terms if way == MANY else of_an_instrument)(part, ends[0], usual)
+            if first is None or first.curves[0].length > LONGEST * n:
                 continue
             runs = [curve for each in stretches for curve in each.runs()]
-            null = max(without(*span, False), without(*span, True), weighed_on(part, near, runs), key=_likelihood)
-            best = of_any_shape(part, first)
+            null = max(usual(), without(*span, True), weighed_on(part, near, runs), key=_likelihood)
+            best = first if first.curves[0].wave is not None else of_any_shape(part, first)
             best = max(best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=_likelihood)
-            if stretches in waves:  # motion may be as agile
-                null = max(null, as_it_is(part, part.log.weight, best.model), key=_likelihood)
-            gain = best.log_probability - null.log_probability + seen.prior(best.curves)
-            least = odds.SURE if stretches in waves else odds.ONE_END
+            motion = max(null.log_probability, moved(part, best))
+            if way != FEW:  # motion may be as agile
+                motion = max(motion, as_it_is(part, part.log.weight, best.model).log_probability)
+            gain = best.log_probability - motion + seen.prior(best.curves)
             if least < gain < odds.PERFECT * part.possible.sum():
                 found.append(Found(in_whole(best, near, n), best.sigma, gain))
     return max(found, key=lambda each: each.gain, default=None)
@@ -218,7 +232,7 @@ def of_few_terms(
     """The likeliest of curves of a few terms with these ends; None if those with the last ends explain the part of a
     log no better than motion does, and most terms too little for a gain of so much with this prior: motion that does
     not follow the patch leaves more to them. without: weighs the part without any."""
-    few, most = ends[-1], [curve.of(MANY) for curve in ends[-1]]
+    few, most = ends[-1], [curve.of(SCREENED) for curve in ends[-1]]
     if not may_leave_curves(part, few, most, least - prior):
         return None
     first = weighed(part, part.log.weight, few)
@@ -228,14 +242,43 @@ def of_few_terms(
 
 
 def of_many_terms(part: Scene, curves: Sequence[Curve], without: Callable[[], Weighed]) -> Weighed | None:
-    """Curves with these ends and as many terms as they may have, as waves need; None if other readings ask for the
-    process noise that a part of a log has there, or motion is likelier."""
-    if not others_as_usual(part, curves):
+    """The likelier of a wave about these ends, and of curves of as many terms as they may have; None if motion is
+    likelier than either, as a wave of the target may be."""
+    wave, many = of_a_wave(part, curves), others_as_usual(part, curves)
+    if wave is None and not many:
         return None
+    found, least = None, without().log_probability
+    if wave is not None and is_of_the_target(part, wave):
+        least = max(least, wave.log_probability + odds.SURE)
+    elif wave is not None and wave.log_probability > least:
+        found = wave
+    if not many:  # what the curves do not act on asks for the process noise as well
+        return found
     shortest = min(curve.end - curve.begin for curve in curves)
     terms = max(each for each in TERMS if PER_TERM * each <= shortest)
-    found = weighed(part, part.log.weight, [curve.of(terms) for curve in curves])
-    return found if found.log_probability > without().log_probability else None
+    most = weighed(part, part.log.weight, [curve.of(terms) for curve in curves])
+    if most.log_probability <= least:
+        return found
+    return most if found is None else max(most, found, key=_likelihood)
+
+
+def of_an_instrument(part: Scene, curves: Sequence[Curve], without: Callable[[], Weighed]) -> Weighed | None:
+    """The likeliest wave about these ends; None if there is none, or motion is likelier, or it is the target's."""
+    wave = of_a_wave(part, curves)
+    if wave is None or wave.log_probability <= without().log_probability or is_of_the_target(part, wave):
+        return None
+    return wave
+
+
+def of_a_wave(part: Scene, curves: Sequence[Curve]) -> Weighed | None:
+    """The likeliest wave about these ends, of whatever; None if there is none."""
+    wave = likeliest_wave(part, curves)
+    if wave is None:
+        return None
+    found = weighed(part, part.log.weight, wave)
+    for _ in range(SHARPENED):
+        found = _likeliest(part, [sharper_wave(part, found)], found)
+    return found
 
 
 def of_any_shape(part: Scene, best: Weighed) -> Weighed:

@@ -26,13 +26,15 @@ ROUNDS, NEAR = 4, 0.1  # of finding the sizes, because the track bends with them
 class Curve(NamedTuple):
     """From sample `begin` to `end` the readings of a component (range, azimuth, elevation) of a station are larger by
     the polynomial whose Legendre coefficients over their time are `size`, m, rad, rad, or, where it is CLOCK, their
-    times, s. Sizes that are not known yet are zero."""
+    times, s. Sizes that are not known yet are zero. wave: of another curve the rate, rad/s, and by how much it dies
+    away, 1/s; its sizes are those of its cosine and sine from the first of its readings on."""
 
     component: int
     begin: int
     end: int
     size: tuple[float, ...]
     station: int = 0
+    wave: tuple[float, float] | None = None
 
     @property
     def rows(self) -> slice:
@@ -86,11 +88,20 @@ class Fitted(NamedTuple):
 
 
 def _basis(curve: Curve, time_s: FloatArray) -> FloatArray:
-    """(m, terms) Legendre polynomials at the times (m,) of the readings of a curve."""
+    """(m, terms) of a curve at the times (m,) of its readings."""
     if not len(time_s):
         return np.zeros((0, len(curve.size)))
+    if curve.wave is not None:
+        return swing(*curve.wave, time_s - time_s[0])
     half = max(0.5 * (time_s[-1] - time_s[0]), 1e-300)
     found: FloatArray = np.polynomial.legendre.legvander((time_s - time_s[0]) / half - 1.0, len(curve.size) - 1)
+    return found
+
+
+def swing(rate_radps: float, decay_per_s: float, time_s: FloatArray) -> FloatArray:
+    """(m, 2) cosine and sine that die away from the time zero on."""
+    cycles = np.stack([np.cos(rate_radps * time_s), np.sin(rate_radps * time_s)], 1)
+    found: FloatArray = np.exp(-decay_per_s * time_s)[:, None] * cycles
     return found
 
 

@@ -105,6 +105,7 @@ def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monk
         without_the_runs.setattr(Between, "runs", lambda self: [])
         assert error_m() < 1.0
         without_the_runs.setattr(search, "instead_of", lambda seen, found: None)
+        without_the_runs.setattr(between, "moved", lambda *of: -np.inf)
         for screen in SCREENS:
             without_the_runs.setattr(between, screen, lambda *of: True)
         assert error_m() > 10.0
@@ -150,11 +151,12 @@ def test_a_wave_that_leaves_nothing_where_it_begins_and_ends_is_found(seed):
 
 
 @pytest.mark.compiled
-def test_no_waves_are_weighed_where_other_components_show_the_motion_too(monkeypatch):
+def test_no_curves_of_many_terms_are_weighed_where_other_components_show_the_motion_too(monkeypatch):
     flight, stretches, each = simulate("manoeuvre-clean", seed=4, duration_s=60.0), list[object](), list[object]()
     many, weighed = between.of_many_terms, between.weighed
     monkeypatch.setattr(between, "of_many_terms", lambda *of: stretches.append(0) or many(*of))
     monkeypatch.setattr(between, "weighed", lambda *of: each.append(0) or weighed(*of))
+    monkeypatch.setattr(between, "of_a_wave", lambda *of: None)
     two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
     assert stretches
     assert not each
