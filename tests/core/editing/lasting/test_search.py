@@ -170,7 +170,13 @@ def test_a_jump_does_not_hide_in_noise_that_seems_to_grow(name, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "seed", "rms_m"), [("seldom", 3, 300.0), ("often", 4, 60.0)])
+@pytest.mark.parametrize(
+    ("name", "seed", "rms_m"),
+    [
+        ("seldom", 3, 300.0),
+        pytest.param("often", 4, 25.0, marks=pytest.mark.xfail(reason="49 m: flight between patches is left out")),
+    ],
+)
 def test_two_short_patches_are_not_one_long(name, seed, rms_m):
     """Flights with many patches of seconds: 4,322 and 677 m off where what lies between two of them is left out."""
     made = hard.make(name, seed).simulated
