@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core import odds
 from ftproc.core.editing import patch_likelihood
@@ -23,7 +24,7 @@ from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import roughness
 from ftproc.core.identification.scales import Scales
-from ftproc.core.live.newest.readmission import Open, Other, log_probability, moving, rejected
+from ftproc.core.live.newest.readmission import FEWER, Open, Other, log_probability, moving, rejected
 from ftproc.core.model.frames import line_of_sight_axes, wrap
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray
@@ -33,6 +34,8 @@ NEARLY = 0.5  # of what the readings were off, within which they are back (anoth
 JUMPED, BACK = 4, 2  # readings in a row that show it
 FASTEST = 1e3  # 1/s, of the growth of an offset
 SHORTEST, LONGER = 8, math.sqrt(2)  # readings of an earlier patch that is tried, and times as many in the next
+LIKELIEST = 3  # of these, before the process noise follows, that are weighed with it (of 12 dense flights two are worse
+# with one, none with three)
 NEARLY_WHOLE = 1e-9  # powers of LONGER are rounded
 
 
@@ -192,17 +195,23 @@ def _times(samples: int) -> int:
 
 def _as_it_came(case: Open, c: int, jumped: IntArray, profile: Model, scales: Scales) -> Iterator[Other]:
     """The readings of a component that have jumped are right as they came, where those before are, or the last of
-    them were a patch."""
+    them were a patch: the likeliest of these."""
     begin, level, sigma = _begin(case, c), case.level.copy(), case.level_sigma.copy()
     level[begin:, c] = sigma[begin:, c] = 0.0
     none = _levelled(case, np.r_[jumped, rejected(case, c)], c, level, sigma)
     _, now = _with_jump(case, none.log.measurement, c, jumped, float(case.level[-1, c]))
-    for off in (jumped[:0], *_last_ones(np.flatnonzero(case.log.weight[:begin, c] > 0))):
-        weight, possible = none.log.weight.copy(), case.possible.copy()
-        weight[off, c], possible[off, c] = 0.0, False
-        other = none._replace(log=none.log._replace(weight=weight))
-        found = moving(other, profile, scales, now - roughness(case.model))
+    patches = [_left_out(none, off, c) for off in _last_ones(np.flatnonzero(case.log.weight[:begin, c] > 0))]
+    patches.sort(key=lambda each: -log_probability(each[0], each[0].log.weight))
+    for other, possible in ((none, case.possible), *patches[:LIKELIEST]):
+        found = moving(other, profile, scales, now - roughness(case.model), FEWER)
         yield found._replace(case=found.case._replace(possible=possible))
+
+
+def _left_out(case: Open, off: IntArray, c: int) -> tuple[Open, NDArray[np.bool_]]:
+    """Some readings were a patch; and which are possible then."""
+    weight, possible = case.log.weight.copy(), case.possible.copy()
+    weight[off, c], possible[off, c] = 0.0, False
+    return case._replace(log=case.log._replace(weight=weight)), possible
 
 
 def _last_ones(good: IntArray) -> Iterator[IntArray]:

@@ -25,7 +25,8 @@ from ftproc.records import FloatArray
 
 KEPT = ("possible", "level", "level_sigma")
 ROUNDS = 3  # of smoothing and deciding
-MOVES_STEPS = 6  # of the search for the process noise of a target that begins to move
+MOVES_STEPS, FEWER = 6, 3  # of the search for the process noise of a target that begins to move; fewer for each of
+# several that may
 
 
 class Open(NamedTuple):
@@ -85,10 +86,10 @@ def readmitted(case: Open, profile: Model, scales: Scales | None) -> Other | Non
     return rival if rival.gain > other.gain else other
 
 
-def moving(case: Open, profile: Model, scales: Scales, now: float) -> Other:
+def moving(case: Open, profile: Model, scales: Scales, now: float, steps: int = MOVES_STEPS) -> Other:
     """A case with the process noise by which its target begins to move. now: the penalised log-probability of what
     it is an alternative to."""
-    profile = fit_profile(case.log, [case.start], profile, MOVES_STEPS, scales)
+    profile = fit_profile(case.log, [case.start], profile, steps, scales)
     moves = case._replace(model=with_allowance(case.log, profile, scales))
     return Other(moves, profile, log_probability(moves, case.log.weight) - roughness(moves.model) - now)
 
