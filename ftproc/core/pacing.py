@@ -14,8 +14,14 @@ PASS = 400  # samples that a sweep costs beyond those of its readings
 _here = threading.local()
 
 
+def spent() -> int:
+    """Samples that this thread has swept through so far, with what sweeps cost beyond."""
+    return getattr(_here, "spent", 0)
+
+
 def swept(samples: int) -> None:
     """Says that so many samples are about to be swept through. Waits where the thread is paced and its credit used."""
+    _here.spent = spent() + samples + PASS
     work: _Work | None = getattr(_here, "work", None)
     if work is not None:
         work.spend(samples + PASS)

@@ -37,6 +37,7 @@ from ftproc.core.live import (
     whole,
     window,
 )
+from ftproc.core.live.newest import deciding
 from ftproc.core.model import motion
 from ftproc.correction import live as correction
 from ftproc.errors import InputError, OutputError
@@ -45,7 +46,7 @@ from ftproc.live import live, order, times
 from ftproc.live.lines import forms, growing, plots
 from ftproc.methods.height.priors import Prior
 
-MAGIC = b"ftproc state 2\n"
+MAGIC = b"ftproc state 3\n"
 _HEAD = struct.Struct("<Q16s")  # size and digest of what is known
 _ENTRY = struct.Struct("<dBII")  # time of the clock, kind, size, and a check of all that
 
@@ -59,7 +60,7 @@ _KINDS: dict[str, Any] = {
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, pieces.Flown, readings.Labels,
         readings.Repeats, rows.Waiting, rows.Published, rows.Smoothed, records.Model, records.Start,
         smoother.SmootherRun, two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion,
-        motion.Jolts, beside.Rates, Prior, times.Times, times.Pause, turning.Second, turning.Turning,
+        motion.Jolts, beside.Rates, Prior, times.Times, times.Pause, turning.Second, turning.Turning, deciding.Deciding,
         correction.LiveCorrection, records.FilterRun,
     )
 }  # fmt: skip

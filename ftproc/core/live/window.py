@@ -24,7 +24,7 @@ from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.live import beside
 from ftproc.core.live.kept import Kept
 from ftproc.core.live.newest import levels
-from ftproc.core.live.newest.deciding import decided
+from ftproc.core.live.newest.deciding import Deciding
 from ftproc.core.live.newest.readmission import KEPT, Open
 from ftproc.core.live.pieces import BLOCK, Flown, Sizes, filtered, later, may_be_anywhere, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of
@@ -58,7 +58,7 @@ class Window:
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.fresh = 0  # samples that no refresh has seen
         self.under_way: Whole | None = None
-        self.turning = Turning(acts=not known.white_jerk)
+        self.turning, self.deciding = Turning(acts=not known.white_jerk), Deciding()
         self.kept, self.side = Kept.nothing(), beside.Rates()
         self._bar(self._take(time_s, measurement))
 
@@ -248,7 +248,7 @@ class Window:
         by_hand, kept = self.known.accepted.of(log.time_s, log.measurement), self.kept
         before = Open(log, self.allowed, self.anchor, self.rates, by_hand, *(kept[name][near] for name in KEPT))
         jumps, free = self.forgotten + self.near > self.begun and not self.white, self.known.jerk_psd is None
-        case, self.model = decided(before, gate, self.model, scales if free else None, jumps, self.fresh)
+        case, self.model = self.deciding.decided(before, gate, self.model, scales if free else None, jumps, self.fresh)
         if case.level is not before.level:
             self.under_way, self.anchor = None, case.start  # an edit of all knows nothing of it
             for name in KEPT:

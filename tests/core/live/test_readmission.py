@@ -10,7 +10,7 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.live.newest import readmission
-from ftproc.core.live.newest.deciding import decided
+from ftproc.core.live.newest.deciding import Deciding
 from ftproc.core.live.newest.readmission import Open
 from ftproc.core.model.frames import from_cartesian
 from tests.core.tracks import matched
@@ -103,7 +103,7 @@ def test_a_target_that_begins_to_turn_is_followed(begun):
     open_, position = turning(begun)
     assert readmitted(open_) is None
     scales = scales_of(open_.log, open_.model.noise_variance)
-    found, profile = decided(open_, 4.0, open_.model, scales, jumps=True, fresh=1)
+    found, profile = Deciding().decided(open_, 4.0, open_.model, scales, jumps=True, fresh=1)
     assert found.log.weight[-begun + 2 :].mean() > 0.9
     assert profile.jerk.max() > 1e3 * open_.model.jerk.max()
     run = smooth_log(found.log, found.model, [found.start])
@@ -113,6 +113,6 @@ def test_a_target_that_begins_to_turn_is_followed(begun):
 def test_a_patch_is_no_turn():
     open_ = case(24, slice(96, 120), (0, 1), sigmas=200.0)
     scales = scales_of(open_.log, open_.model.noise_variance)
-    found, profile = decided(open_, 4.0, open_.model, scales, jumps=False, fresh=1)
+    found, profile = Deciding().decided(open_, 4.0, open_.model, scales, jumps=False, fresh=1)
     assert profile is open_.model
     assert not found.log.weight[96:, :2].any()
