@@ -98,8 +98,6 @@ class LiveEditor:
                 self.put_off = True
                 if self.lag_s == 0 or self._presses(self.window):
                     self.work()
-                if self.lag_s > 0 and self.count >= self.next_refresh and not self.clock.stands:
-                    self._refresh(self.window)
             found += self._leave(self.count) if self.lag_s == 0 else self._due(float(time_s[high - 1]) + NEARLY_S)
             low = high
         return found

@@ -14,7 +14,7 @@ from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
 REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
-WORK_S, WORK_PER_S = 0.05, 160_000  # between turns at an edit of all of the window, or one sample; and how much of it
+WORK_S, WORK_PER_S = 0.02, 160_000  # between turns at an edit of all of the window, or one sample; and how much of it
 # there is for each second that the readings last: so many samples that are filtered
 WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
 NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
