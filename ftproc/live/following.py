@@ -17,6 +17,7 @@ from ftproc.records import Trajectory
 
 SOON_S = 0.003  # before rows are due, what may take a while is not begun
 MOMENT_S = 0.5  # at the latest between two moments
+WAITING = 1 << 14  # bytes at once, with which the sender may be waiting for us: systems hold four times as much
 
 
 class Following:
@@ -74,6 +75,8 @@ class Following:
             else:
                 self._keep(Entry(now_s, Kind.DATA, data))
                 yield from self._done(Entry(now_s, Kind.DATA, data))
+                if len(data) >= WAITING:  # the clock is not the sender's
+                    self._ahead_s = now_s - time.monotonic()
             yield None
 
     def _polled(self, source: Source, most_s: float) -> bytes | None:
@@ -87,10 +90,12 @@ class Following:
             ) from error
 
     def _done(self, entry: Entry) -> Iterator[Trajectory]:
-        """What is published of something that came; a tick is kept if it publishes anything."""
+        """What is published of something that came; a tick is kept if it publishes anything. Rows that are due when
+        something comes do not wait until nothing does."""
         if entry.kind == Kind.DATA:
             yield from self.stream.take(entry.data, entry.now_s, self.stop)
-        elif self.stream.due_s <= entry.now_s:
+            entry = Entry(entry.now_s, Kind.TICK)
+        if self.stream.due_s <= entry.now_s:
             self._keep(entry)
             yield from self.stream.tick(entry.now_s, self.stop)
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import signal
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from ftproc.config.recipe import Recipe
-from ftproc.live import publishing, sources, stream
+from ftproc.live import following, publishing, sources, stream
 from ftproc.live import stop as stop_module
 from ftproc.live.following import Following
 from ftproc.live.live import Live
 from ftproc.live.stop import Stop
 from ftproc.live.stream import Stream
 from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate
 from tests.trust.streams import BAD_TIMES, flight, lines
 
 HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
@@ -97,3 +99,55 @@ def test_a_run_that_is_killed_in_its_first_piece_of_the_log_is_gone_on_with(tmp_
     publishing.follow_log(request, recipe, said.append)
     assert [line for line in said if "goes on after" in line]
     assert pd.read_csv(out)["row"].tolist() == list(range(100))
+
+
+class Sender:
+    """A source of which something has come whenever it is asked, and a clock that goes on by so much each time."""
+
+    news = ""
+
+    def __init__(self, pieces, step_s):
+        self.pieces, self.step_s, self.now_s = iter([*pieces, b""]), step_s, 0.0
+
+    def poll(self):
+        self.now_s += self.step_s
+        return next(self.pieces)
+
+
+def sent(monkeypatch, log, at_once, lag_s, step_s=0.0, push_s=0.0):
+    """What is published of a log whose rows come so many at once, part by part, and when. step_s: from one time that
+    something comes to the next. push_s: that a push takes."""
+    rows = [",".join(map(repr, row)) + "\n" for row in np.column_stack([log.time_s, log.measurement]).tolist()]
+    pieces = ["".join(rows[low : low + at_once]) for low in range(0, len(rows), at_once)]
+    sender, push = Sender([text.encode() for text in (HEADER + pieces[0], *pieces[1:])], step_s), Live.push
+
+    def slowly(self, *rows, **more):
+        sender.now_s += push_s
+        return push(self, *rows, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Live, "push", slowly)
+        patch.setattr(following, "time", SimpleNamespace(monotonic=lambda: sender.now_s))
+        stream_ = Stream("-", Recipe(settings=FilterSettings(editing="live", lag_s=lag_s)), lambda _: None)
+        track = Following(stream_, Stop(), lambda _: None)
+        found = [(part, sender.now_s) for part in track._follow(sender) if part is not None]
+        return [*found, *((part, sender.now_s) for part in stream_.finish(track.stop))]
+
+
+def test_rows_leave_when_their_lag_has_passed_though_more_has_come(monkeypatch):
+    """Where that is slower than the readings, there is always more."""
+    log = simulate("cruise", seed=4, duration_s=12.0, dt_s=0.05).log
+    begin_s, waited = log.time_s[0] - 0.05, np.zeros(0)
+    for part, now_s in sent(monkeypatch, log, 1, 0.5, step_s=0.05):
+        waited = np.append(waited, now_s + begin_s - part.time_s)
+    assert len(waited) == len(log)
+    assert np.quantile(waited, 0.95) < 0.5 + 0.11
+
+
+def test_the_clock_stands_while_the_sender_waits(monkeypatch):
+    """Nobody knows then when the next readings would have come."""
+    log, at_once = simulate("cruise", seed=4, duration_s=40.0, dt_s=0.05).log, 280
+    slow, fast = ([part for part, _ in sent(monkeypatch, log, at_once, 15.0, push_s=each)] for each in (5.0, 0.0))
+    for name in ("row", "state"):
+        one, other = (np.concatenate([getattr(part, name) for part in parts]) for parts in (slow, fast))
+        np.testing.assert_array_equal(one, other)
