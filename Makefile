@@ -11,6 +11,7 @@ FUZZ = csv gzip parquet feather mat nc npz h5 json names truth trajectory statio
 FUZZ_SECONDS = 600
 OLDEST = tests/files tests/live/test_outputs.py tests/config tests/correction tests/test_pipeline.py tests/docs/test_readme.py
 KERNELS ?= tests/core
+JIT ?= $(KERNELS)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -139,8 +140,8 @@ test: $(developer) ## lint, types and the whole test suite
 	$(bin)/mypy
 	FTPROC_KERNELS=compiled $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
 
-kernels: $(developer) ## the tests KERNELS of the kernels as numba compiles them now, and as plain Python
-	FTPROC_KERNELS=jit $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal $(KERNELS)
+kernels: $(developer) ## the tests JIT of the kernels as numba compiles them now, and KERNELS as plain Python
+	FTPROC_KERNELS=jit $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal $(JIT)
 	FTPROC_KERNELS=python $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal $(KERNELS)
 
 samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
@@ -181,7 +182,8 @@ fuzz: $(developer) ## fuzz the readers and the filter (FUZZ) for FUZZ_SECONDS ea
 	  $(bin)/python -m tests.fuzz $$target $(FUZZ_SECONDS) || found=1; done; exit $$found
 
 oldest: $(oldest) ## the tests OLDEST with the oldest versions that are supported (Python 3.11)
-	NUMBA_CACHE_DIR=$(abspath $(VENV)-oldest/compiled) $(VENV)-oldest/bin/python -m pytest -q -p no:cacheprovider $(OLDEST)
+	NUMBA_CACHE_DIR=$(abspath $(VENV)-oldest/compiled) $(VENV)-oldest/bin/python -m pytest -q -n logical \
+	  --maxprocesses 8 --dist worksteal -p no:cacheprovider $(OLDEST)
 
 $(oldest): pyproject.toml tests/requirements-oldest.txt
 	@echo 'installing the oldest supported versions in $(VENV)-oldest'
@@ -189,7 +191,8 @@ $(oldest): pyproject.toml tests/requirements-oldest.txt
 	  { echo 'The oldest versions need Python 3.11: make oldest PYTHON=/path/to/python3.11' >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV)-oldest
 	@$(VENV)-oldest/bin/python -m pip install --quiet --disable-pip-version-check \
-	  -c tests/requirements-oldest.txt -e '.[geo,formats,hdf5,report,wavelet]' pytest hypothesis
+	  -c tests/requirements-oldest.txt -e '.[geo,formats,hdf5,report,wavelet]' \
+	  pytest pytest-xdist hypothesis
 	@touch $@
 
 audit: $(developer) ## whether a vulnerability of one of the tested versions is known to PyPI
