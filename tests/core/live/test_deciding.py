@@ -59,7 +59,7 @@ def test_a_clock_that_goes_back_costs_nothing():
     assert each.left <= left
 
 
-def test_nothing_more_is_begun_when_enough_was_done_at_once(monkeypatch):
+def test_nothing_more_starts_when_enough_was_done_at_once(monkeypatch):
     """What else may hold is weighed with the next decisions."""
     each, tried = Deciding(), list[int]()
     refreshed(each)
