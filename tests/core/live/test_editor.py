@@ -271,6 +271,20 @@ def test_what_is_put_off_may_be_done_at_any_moment(flight, lag_s):
     np.testing.assert_array_equal(state, whole)
 
 
+def test_no_row_waits_for_what_its_last_reading_sets_off(monkeypatch):
+    """The newest part is decided on again after the rows have left, without that reading or with the next one."""
+    log = simulate("manoeuvre-clean", seed=3, duration_s=12.0, dt_s=0.04).log
+    editor, seen, refresh = live.editor(FilterSettings(editing="live", lag_s=0.48)), list[float](), Window.refresh
+    monkeypatch.setattr(Window, "refresh", lambda window: (seen.append(window.time_s[-1]), refresh(window)))
+    old, refreshes = 100, 0
+    for k in range(len(log)):
+        seen.clear()
+        editor.push(log.time_s[k : k + 1], log.measurement[k : k + 1])
+        refreshes += k > old and len(seen) > 0
+        assert k <= old or all(time_s < log.time_s[k] for time_s in seen)
+    assert refreshes > 50
+
+
 def test_a_track_in_doubt_is_edited_bit_by_bit(monkeypatch):
     """In more turns than one, each of three times the work of others."""
     log, turns, go_on = simulate("manoeuvre", seed=1, duration_s=20.0, dt_s=0.01).log, [], Window.go_on

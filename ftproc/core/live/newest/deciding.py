@@ -14,7 +14,8 @@ from ftproc.core.live.newest.readmission import Open, readmitted, settled
 COMPONENTS = 3  # that may jump at once
 PER_S, MOST_S = 320_000, 0.3  # samples that may be swept through to weigh what else may hold, for each second that the
 # readings last, and so long it is kept (of 12 dense flights two are worse with half of it, one is with this)
-AT_ONCE = 0.5  # of what the time since the last decisions allows, after which nothing more of it starts
+AT_ONCE = 0.5  # of what the time since the last decisions allows, after which nothing more of it starts (longest burst
+# at 100 Hz 87 to 56 sweeps, two of 24 dense runs at 20 Hz are worse)
 
 
 class Deciding:
