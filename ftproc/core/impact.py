@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.forward import Span, filter_log, run_weighted
 from ftproc.core.filtering.records import Model, Observations, Start, empty_rows
-from ftproc.core.identification.motions.motion_models import falls
+from ftproc.core.identification.motions.falling import falls
 from ftproc.core.model.forces import GRAVITY
 from ftproc.core.model.motion import EARTH_M
 

@@ -1,16 +1,16 @@
 """The forces on what flies: how the acceleration turns, grows and falls with the motion, beside its white jerk.
 
-With g(p) the earth's gravity, W its rotation, and D = a - g + 2 W x v the specific force,
+With g(p) the earth's gravity, W its rotation, D = a - g + 2 W x v the specific force, and u = v - wind,
 
-    a' = G v - 2 W x a - W x (W x v) + w x D + b (2 v.a / s^2 - climb / H) D - c g (v.a / s^3) v + white jerk
-    w = v x a / s^2      s^2 = v^2 + v0^2      G = dg/dp      b = max(-D.v / (|D| s), 0)
+    a' = G v - 2 W x a - W x (W x v) + w x D + b (2 u.a / s^2 - climb / H) D - c g (u.a / s^3) u + white jerk
+    w = u x a / s^2      s^2 = u^2 + v0^2      G = dg/dp      b = max(-D.u / (|D| s), 0)
 
-The specific force of an aircraft turns with its velocity (w x D). What brakes also grows with the square of the speed
-and falls with the density of the air; b is its share of the force, so that a motor, the wings of an aircraft and the
-bomb that it drops follow one law. A speed settles where thrust meets drag, within about the time s / g in which gravity
-would change it: the acceleration along the path fades (c), in steps longer than that by a half in each kick. v0 lets
-the turn fade in hover and at rest. A model of motion is a choice of these. The earth is round and has the gravity of
-its surface; where it turns, see `gravity`.
+The specific force of an aircraft turns with its velocity through the air (w x D). What brakes also grows with the
+square of the speed and falls with the density of the air; b is its share of the force, so that a motor, the wings of an
+aircraft and the bomb that it drops follow one law. A speed settles where thrust meets drag, within about the time s / g
+in which gravity would change it: the acceleration along the path fades (c), in steps longer than that by a half in each
+kick. v0 lets the turn fade in hover and at rest. A model of motion is a choice of these. The earth is round and has the
+gravity of its surface; where it turns, see `gravity`.
 
 Over an interval T this is half a kick, the motion of constant acceleration, and half a kick (Strang splitting, of
 second order in T): a <- a + T/2 (f + J (x - x0)), linearised about the states x0 of a course on both sides of the
@@ -36,7 +36,8 @@ FloatArray = NDArray[np.float64]
 
 GRAVITY = 9.80665  # m/s2
 AT_REST_MPS = 3.0  # v0
-SCALE_HEIGHT_M = 8500.0  # H
+# H of the standard atmosphere (ISO 2533): at sea level, what it falls by per metre, and in the stratosphere
+SCALE_HEIGHT_M, LAPSE, LEAST_SCALE_M = 10_417.0, 0.235, 6_342.0
 LEAST_FORCE = 1e-300  # m2/s4: of none, nothing is known
 
 
@@ -72,35 +73,37 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -
     r0, r1, r2 = x[0] - by.earth[1, 0], x[1] - by.earth[1, 1], x[2] - by.earth[1, 2]
     ir2 = 1 / (r0 * r0 + r1 * r1 + r2 * r2)
     ir = math.sqrt(ir2)
+    u0, u1, u2 = v0 - by.wind[0], v1 - by.wind[1], v2 - by.wind[2]
     pull = (MASS_M3PS2 if spins else GRAVITY * EARTH_M * EARTH_M) * ir2 * ir  # g = -pull r
     rv = r0 * v0 + r1 * v1 + r2 * v2
     d0 = a0 + pull * r0 + w1 * v2 - w2 * v1
     d1 = a1 + pull * r1 + w2 * v0 - w0 * v2
     d2 = a2 + pull * r2 + w0 * v1 - w1 * v0
-    i2 = 1 / (v0 * v0 + v1 * v1 + v2 * v2 + AT_REST_MPS * AT_REST_MPS)
+    i2 = 1 / (u0 * u0 + u1 * u1 + u2 * u2 + AT_REST_MPS * AT_REST_MPS)
     dd = max(d0 * d0 + d1 * d1 + d2 * d2, LEAST_FORCE)
-    vd, ad, va = v0 * d0 + v1 * d1 + v2 * d2, a0 * d0 + a1 * d1 + a2 * d2, v0 * a0 + v1 * a1 + v2 * a2
+    ud, ad, ua = u0 * d0 + u1 * d1 + u2 * d2, a0 * d0 + a1 * d1 + a2 * d2, u0 * a0 + u1 * a1 + u2 * a2
     known = dd / (dd + variance)
-    braked = max(-vd * math.sqrt(i2 / dd), 0.0)
+    braked = max(-ud * math.sqrt(i2 / dd), 0.0)
     turns, pressed = known * by.turns * i2, known * by.pressed * braked
-    swell = pressed * (2 * va * i2 - rv * ir / SCALE_HEIGHT_M)
+    scale = max(SCALE_HEIGHT_M - LAPSE * (1 / ir - EARTH_M), LEAST_SCALE_M)
+    swell = pressed * (2 * ua * i2 - rv * ir / scale)
     fades = by.fades * GRAVITY * math.sqrt(i2)
     fade = fades / max(fades * h, 1.0) * i2
-    v, a, d, r = (v0, v1, v2), (a0, a1, a2), (d0, d1, d2), (r0, r1, r2)
+    v, u, a, d, r = (v0, v1, v2), (u0, u1, u2), (a0, a1, a2), (d0, d1, d2), (r0, r1, r2)
     s, b = f.slope, f.kick
     for i in range(3):
-        turned = turns * (a[i] * vd - v[i] * ad)
-        f.push[i] = turned + swell * d[i] - pull * (v[i] - 3 * rv * ir2 * r[i]) - fade * va * v[i]
+        turned = turns * (a[i] * ud - u[i] * ad)
+        f.push[i] = turned + swell * d[i] - pull * (v[i] - 3 * rv * ir2 * r[i]) - fade * ua * u[i]
         for j in range(3):
-            by_force = turns * (a[i] * v[j] - v[i] * a[j])
+            by_force = turns * (a[i] * u[j] - u[i] * a[j])
             grows = pressed * d[i]
-            s[i, 3 + j] = by_force - turns * v[i] * d[j] + grows * 2 * i2 * v[j]
-            s[i, j] = turns * a[i] * d[j] - 2 * turned * i2 * v[j] + 3 * pull * ir2 * r[i] * r[j]
-            s[i, j] += grows * (2 * i2 * a[j] - 4 * va * i2 * i2 * v[j] - ir * r[j] / SCALE_HEIGHT_M)
-            s[i, j] -= fade * v[i] * (a[j] - 3 * va * i2 * v[j])
-            s[i, 3 + j] -= fade * v[i] * v[j]
-        s[i, 3 + i] += turns * vd + swell
-        s[i, i] -= turns * ad + pull + fade * va
+            s[i, 3 + j] = by_force - turns * u[i] * d[j] + grows * 2 * i2 * u[j]
+            s[i, j] = turns * a[i] * d[j] - 2 * turned * i2 * u[j] + 3 * pull * ir2 * r[i] * r[j]
+            s[i, j] += grows * (2 * i2 * a[j] - 4 * ua * i2 * i2 * u[j] - ir * r[j] / scale)
+            s[i, j] -= fade * u[i] * (a[j] - 3 * ua * i2 * u[j])
+            s[i, 3 + j] -= fade * u[i] * u[j]
+        s[i, 3 + i] += turns * ud + swell
+        s[i, i] -= turns * ad + pull + fade * ua
     if spins:
         rotate(f, x, w0, w1, w2, turns, swell)
         flatten(f, x, r, by)

@@ -55,14 +55,15 @@ class Motion(NamedTuple):
     of the jerk are along x, y and z, else along the path, across it, and upward. turns, pressed: shares of the force
     that turns with the velocity, and that grows with the pressure of the air. fades: share of the rate, gravity by
     speed, at which the acceleration along the path may fade. earth: its rotation, rad/s, zero where it is not known,
-    and its centre, m. course: (n, 9) the states of the samples about which it is linearised; without
-    rows, about the estimate itself."""
+    and its centre, m. wind: that of the air through which the target flies, m/s. course: (n, 9) the states of the
+    samples about which it is linearised; without rows, about the estimate itself."""
 
     acts: bool = False
     turns: float = 0.0
     pressed: float = 0.0
     fades: float = 0.0
     earth: Matrix = STILL
+    wind: Vector = np.zeros(3)
     course: Matrix = np.zeros((0, 9))
 
     def about(self, course: FloatArray) -> Motion:

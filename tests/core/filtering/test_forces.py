@@ -23,6 +23,7 @@ from tests.core.tracks import matched
 UP = np.array([0.0, 0.0, 1.0])
 TURNING = Motion(acts=True, turns=1.0)
 PRESSED = Motion(acts=True, turns=1.0, pressed=1.0)
+BLOWN = Motion(acts=True, turns=1.0, pressed=1.0, fades=0.3, wind=np.array([12.0, -7.0, 0.0]))
 FADING = Motion(acts=True, turns=1.0, fades=0.8)
 SPUN = Motion(acts=True, earth=np.array([[2e-5, 3e-5, 5e-5], [1e4, -2e4, -6.36e6]]))
 
@@ -50,8 +51,13 @@ def flattening(p, w):
 
 def braked(x, by):
     """b of a state (9,), as the head of `forces` writes it."""
-    d, v = specific(x, by), x[3:6]
-    return max(-d @ v / np.sqrt(d @ d * (v @ v + forces.AT_REST_MPS**2)), 0.0)
+    d, u = specific(x, by), x[3:6] - by.wind
+    return max(-d @ u / np.sqrt(d @ d * (u @ u + forces.AT_REST_MPS**2)), 0.0)
+
+
+def scale_height(height):
+    """H of the standard atmosphere: density as (1 - height / 44331 m)^4.256, higher up exp(-height / 6342 m)."""
+    return max((44331.0 - height) / 4.25588, 6342.0)
 
 
 def force(x, by, share=None):
@@ -59,14 +65,15 @@ def force(x, by, share=None):
     p, v, a = x[:3] - by.earth[1], x[3:6], x[6:]
     r, w = np.linalg.norm(p), by.earth[0]
     pull = mass(by) / r**3
-    d, s2 = specific(x, by), v @ v + forces.AT_REST_MPS**2
+    u = v - by.wind
+    d, s2 = specific(x, by), u @ u + forces.AT_REST_MPS**2
     tide = -pull * (np.eye(3) - 3 * np.outer(p, p) / r**2) @ v - 2 * np.cross(w, a)
     beside = 1e3 * np.eye(3)
     tide += np.stack([flattening(p + d, w) - flattening(p - d, w) for d in beside]).T @ v / 2e3
-    swells = 2 * v @ a / s2 - v @ p / r / forces.SCALE_HEIGHT_M
+    swells = 2 * u @ a / s2 - v @ p / r / scale_height(r - EARTH_M)
     share = braked(x, by) if share is None else share
-    tide -= by.fades * forces.GRAVITY * (v @ a) / s2**1.5 * v
-    return tide + by.turns * np.cross(np.cross(v, a) / s2, d) + by.pressed * share * swells * d
+    tide -= by.fades * forces.GRAVITY * (u @ a) / s2**1.5 * u
+    return tide + by.turns * np.cross(np.cross(u, a) / s2, d) + by.pressed * share * swells * d
 
 
 def kick(x, by, h, vague=0.0):
@@ -106,7 +113,7 @@ def state(seed, speed=150.0):
     return np.r_[rng.normal(0, 4000, 3), speed * rng.normal(0, 0.6, 3), rng.normal(0, 15, 3)]
 
 
-@pytest.mark.parametrize("by", [TURNING, PRESSED, FADING, SPUN])
+@pytest.mark.parametrize("by", [TURNING, PRESSED, BLOWN, FADING, SPUN])
 @pytest.mark.parametrize("seed", range(3))
 def test_prediction_about_the_estimate(by, seed):
     """Half a kick at the state, and half a kick at the state that is predicted."""
@@ -187,7 +194,7 @@ def steps_of(a):
     return steps
 
 
-@pytest.mark.parametrize("by", [TURNING, PRESSED, FADING, SPUN])
+@pytest.mark.parametrize("by", [TURNING, PRESSED, BLOWN, FADING, SPUN])
 def test_the_smoother_is_that_of_rts(by):
     a = forced(4, 60, by, dt=0.2, q=5.0, irregular=True, missing=0.2, pieces=3)
     found, steps = smoother.smooth_log(a.log, a.model, a.starts), steps_of(a)

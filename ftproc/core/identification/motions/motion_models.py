@@ -16,10 +16,11 @@ from ftproc.core import odds
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Scalars, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
 from ftproc.core.identification import decimation
-from ftproc.core.identification.motions import jolts, orbits
-from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, roughness, with_allowance
-from ftproc.core.identification.scales import Scales, scales_of
-from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
+from ftproc.core.identification.motions import falling, jolts, orbits
+from ftproc.core.identification.motions.falling import Logged, finite
+from ftproc.core.identification.profile import ALLOWANCE, climbed, roughness, with_allowance
+from ftproc.core.identification.scales import scales_of
+from ftproc.core.model.forces import AT_REST_MPS
 from ftproc.core.model.motion import WHITE_JERK, Motion
 from ftproc.records import FloatArray, IntArray
 
@@ -33,14 +34,12 @@ MODELS = {
     ORBITAL: Motion(acts=True),
 }
 NOTHING = np.zeros(3, bool)
-STEPS, LONG_STEPS = 3, 10  # of the search for a profile; where it falls by powers of ten once a motor is out
+STEPS = 3  # of the search for a profile
 CLOSE = 2 * odds.SURE  # with less, white jerk is as good as another model, or that as good as white jerk
 FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
 MOST_STEPS = 100  # in a gap
-LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less of it, that may be ballistic
 FADING = (0.5, 1.0)  # of gravity by speed: the rates at which the acceleration along the path may fade
 SETTLED = 4.0  # times the variance of a smoothed acceleration: that of a start which nobody doubts much
-JERK_SHARES = 10.0 ** -np.arange(8)  # of the jerk of white jerk: where the search begins for a body that nobody steers
 
 
 class Candidates(NamedTuple):
@@ -133,7 +132,7 @@ def _chosen(
     names = among.names
     others = among._replace(names=tuple(name for name in names if name != WHITE))
     fitted, short, course = _fitted(log, starts, white, others, known)
-    best = max(fitted, key=lambda each: _finite(each.gain))
+    best = max(fitted, key=lambda each: finite(each.gain))
     other = Chosen(WHITE, white, best.gain, log, starts, white)
     if best.gain > odds.SURE or WHITE not in names:
         found = _about_its_track(best, log, short, course, white)
@@ -169,7 +168,7 @@ def _fitted(
                 orbits.Track(*short[:2], known, others.earth), begin, base if len(names) > 1 else -math.inf
             )
         else:
-            model, likelihood = _unsteered(short, begin) if motion.pressed else _steered(short, begin, base)
+            model, likelihood = falling.fit(short, begin) if motion.pressed else _steered(short, begin, base)
         found.append(Chosen(name, model, likelihood - base, dense, own, white, row))
     return found, short.log, course
 
@@ -185,35 +184,18 @@ def _about_its_track(
     return found.about_its_own() if short is log and again else found
 
 
-class Logged(NamedTuple):
-    """A log with its starts and its scales."""
-
-    log: Observations
-    starts: list[Start]
-    scales: Scales
-
-
 def _may_be(name: str, course: FloatArray) -> bool:
     """Whether a motion is worth a trial, by a course (n, 9): an orbit is one above the air, and nothing else is."""
     if orbits.may_be(course) or name == ORBITAL:
         return orbits.may_be(course) and (name == ORBITAL or not MODELS[name].turns)
-    return not MODELS[name].pressed or falls(course)
-
-
-def falls(course: FloatArray) -> bool:
-    """Whether a good part of a course (n, 9) has almost no lift: that of a bomb, or of a rocket; or an aircraft dropped
-    what is followed."""
-    v, force = course[:, 3:6], course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
-    along = (force * v).sum(1) / np.maximum((v * v).sum(1), AT_REST_MPS**2)
-    lift = np.sqrt(((force - along[:, None] * v) ** 2).sum(1))
-    return bool((lift < LIFT * GRAVITY).mean() > SHARE)
+    return not MODELS[name].pressed or falling.falls(course)
 
 
 def _steered(short: Logged, model: Model, base: float) -> tuple[Model, float]:
     """The likeliest profile from this one on, with its allowance, and the likelihood. Where that is beyond a base, the
     acceleration along the path may fade."""
     model, likelihood = climbed(*short[:2], model, STEPS, short.scales)
-    if _finite(likelihood) > base + odds.SURE:
+    if finite(likelihood) > base + odds.SURE:
         faded = _fading(short, model)
         if faded.motion.fades > 0:
             model, likelihood = climbed(*short[:2], faded, STEPS, short.scales)
@@ -228,7 +210,7 @@ def _fading(short: Logged, model: Model) -> Model:
     found, least = model, likelihood_of(short.log, model, starts) + odds.SURE
     for fades in FADING:
         faded = model._replace(motion=model.motion._replace(fades=fades))
-        likelihood = _finite(likelihood_of(short.log, faded, starts))
+        likelihood = finite(likelihood_of(short.log, faded, starts))
         if likelihood > least:
             found, least = faded, likelihood
     return found
@@ -240,27 +222,6 @@ def _settled(start: Start, head: Start) -> Start:
     covariance[6:], covariance[:, 6:] = 0.0, 0.0
     covariance[6:, 6:] = SETTLED * head.covariance[6:, 6:]
     return Start(start.sample, np.append(start.state[:6], head.state[6:]), covariance)
-
-
-def _unsteered(short: Logged, model: Model) -> tuple[Model, float]:
-    """The same where the jerk may be far smaller than the acceleration's changes: from the likeliest of smaller
-    profiles, and of levels, on, about the track that each leads to."""
-    log, starts, scales = short
-    found = list[tuple[Model, float]]()
-    for shape in (model, median_level(model)):
-        tried = [shape._replace(jerk=times * shape.jerk) for times in JERK_SHARES]
-        best = max(tried, key=lambda each: _finite(likelihood_of(log, each, starts)))
-        for _ in range(2):
-            best, likelihood = climbed(log, starts, best, LONG_STEPS, scales)
-            best = best._replace(motion=best.motion.about(smooth_log(log, best, starts).state))
-        found.append((best, likelihood))
-    best, likelihood = max(found, key=lambda each: _finite(each[1]))
-    least = scales.jerk_psd(scales.span_s)
-    return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, least)), likelihood
-
-
-def _finite(likelihood: float) -> float:
-    return likelihood if math.isfinite(likelihood) else -math.inf
 
 
 def with_steps(
