@@ -172,7 +172,9 @@ class Filtering:
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
         rows = slice(part.first + part.low, part.first + part.high)
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
-        state, (sigma, los_sigma) = best.state.copy(), unseen_motion.widened(best.state, best.sigma, best.los_sigma)
+        falls = estimate.motion is not None and estimate.motion.model.motion.pressed > 0
+        sigma, los_sigma = unseen_motion.widened(best.state, best.sigma, best.los_sigma, falls)
+        state = best.state.copy()
         path_sigma = kinematics.widened(best.state, best.path_sigma, best.sigma, sigma)
         state[:, :6] += correction
         known = slice(None) if estimate.known is None else estimate.known

@@ -111,7 +111,8 @@ def _flight(
     summary |= _impact(fused, float(track.time_s[-1]) + zero_s, range_.origin)
     metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read), **effects.metadata()}
     n = len(track.time_s)
-    sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
+    falls = fused.last is not None
+    sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan), falls)
     path_sigma = kinematics.widened(track.state, track.path_sigma, track.sigma, sigma)
     trajectory = Trajectory(
         range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, sigma,

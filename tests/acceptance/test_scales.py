@@ -19,7 +19,7 @@ SETTINGS = FilterSettings(motion="white-jerk", smooth=True)
 
 @pytest.fixture(autouse=True)
 def _nothing_known_of_flights(monkeypatch):
-    monkeypatch.setattr(unseen_motion, "widened", lambda state, sigma, los_sigma: (sigma, los_sigma))
+    monkeypatch.setattr(unseen_motion, "widened", lambda state, sigma, los_sigma, falls: (sigma, los_sigma))
 
 
 def in_units(log, length, duration):

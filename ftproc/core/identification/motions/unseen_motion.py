@@ -11,6 +11,7 @@ w = 2^k w0 such motion is taken to have
 
 * no more of an acceleration than flights have there: AT_REST, and more with speed, since a gust of the same velocity
   pushes in proportion to airspeed (Pratt 1953; FAR 25.341), up to the frequency FASTEST of an airframe's own modes;
+  where what flies has no wings, what a GUST along its path adds to its drag, which grows with the square of airspeed;
 * no more of an amplitude than the noise would have hidden: a variance of HIDDEN w / w0 times that of the position,
   which is about half of the noise in the octave.
 
@@ -26,22 +27,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
+from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
 from ftproc.core.signatures import Matrix
 
 FloatArray = NDArray[np.float64]
 
 AT_REST = 0.1  # m/s2 in an octave
 PER_SPEED = 1e-3  # m/s2 for each m/s
+GUST_MPS = 1.0  # in an octave
 FASTEST = 4.0  # rad/s; the octave above it has less and less
 HIDDEN = 0.5
 ROUNDING = 1e-15  # of a number, below which its last digits say nothing: no sigma is smaller
 
 
-def widened(state: FloatArray, sigma: FloatArray, los_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def widened(
+    state: FloatArray, sigma: FloatArray, los_sigma: FloatArray, falls: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """Sigmas (n, 9) of states (n, 9), and (n, 6) along the line of sight, SI units, that allow for unseen motion. NaN
-    stays NaN."""
+    stays NaN. falls: whether the motion is ballistic."""
     wider = np.array(sigma, order="C"), np.array(los_sigma, order="C")
-    _widen(np.ascontiguousarray(state), *wider)
+    _widen(np.ascontiguousarray(state), falls, *wider)
     least = np.stack([ROUNDING * np.sqrt((state[:, a : a + 3] ** 2).sum(1)) for a in (0, 3, 6)], 1)
     for each in wider:
         np.maximum(each, np.repeat(least, 3, 1)[:, : each.shape[1]], out=each)
@@ -49,14 +54,18 @@ def widened(state: FloatArray, sigma: FloatArray, los_sigma: FloatArray) -> tupl
 
 
 @kernel
-def _widen(state: Matrix, sigma: Matrix, los_sigma: Matrix) -> None:
+def _widen(state: Matrix, falls: bool, sigma: Matrix, los_sigma: Matrix) -> None:
     """The same in place."""
     added = np.empty((3, 3))  # by axis: of position, velocity and acceleration, (m, s)^2
     for k in range(len(state)):
         x = state[k]
-        speed = PER_SPEED * math.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+        v2 = x[3] * x[3] + x[4] * x[4] + x[5] * x[5]
+        push = AT_REST * AT_REST + PER_SPEED * PER_SPEED * v2
+        if falls:
+            force2 = x[6] * x[6] + x[7] * x[7] + (x[8] + GRAVITY) * (x[8] + GRAVITY)
+            push = 4 * GUST_MPS * GUST_MPS * force2 / (v2 + AT_REST_MPS * AT_REST_MPS)
         for i in range(3):
-            _unseen(AT_REST * AT_REST + speed * speed, sigma[k, i], sigma[k, 6 + i], added[i])
+            _unseen(push, sigma[k, i], sigma[k, 6 + i], added[i])
             for j in range(3):
                 sigma[k, 3 * j + i] = math.sqrt(sigma[k, 3 * j + i] * sigma[k, 3 * j + i] + added[i, j])
         ground = max(math.sqrt(x[0] * x[0] + x[1] * x[1]), 1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.motions.unseen_motion import AT_REST, FASTEST, HIDDEN, PER_SPEED, widened
+from ftproc.core.identification.motions.unseen_motion import AT_REST, FASTEST, GUST_MPS, HIDDEN, PER_SPEED, widened
 from ftproc.core.model.frames import from_cartesian, line_of_sight_axes
 from ftproc.core.model.motion import isotropic
 
@@ -20,11 +20,15 @@ def states(n, seed=1):
     return state, np.hstack([position, 0.7 * position * w, position * w**2])
 
 
-def plain(state, sigma):
+def plain(state, sigma, falls):
     """(n, 9) variances, octave by octave."""
     added = np.zeros_like(sigma)
     for k, i in np.ndindex(len(state), 3):
-        push = AT_REST**2 + (PER_SPEED * np.linalg.norm(state[k, 3:6])) ** 2
+        speed = np.linalg.norm(state[k, 3:6])
+        push = AT_REST**2 + (PER_SPEED * speed) ** 2
+        if falls:  # its drag is the force by speed squared: a gust along the path adds twice its share of the speed
+            drag = np.linalg.norm(state[k, 6:] + [0, 0, 9.80665])
+            push = (2 * drag * GUST_MPS) ** 2 / (speed**2 + 3.0**2)
         first = np.sqrt(sigma[k, 6 + i] / sigma[k, i])
         for octave in range(40):
             w = 2.0**octave * first
@@ -35,10 +39,11 @@ def plain(state, sigma):
     return sigma**2 + added
 
 
-def test_sum_over_octaves():
+@pytest.mark.parametrize("falls", [False, True])
+def test_sum_over_octaves(falls):
     state, sigma = states(200)
-    found, _ = widened(state, sigma, np.zeros((200, 6)))
-    np.testing.assert_allclose(found**2, plain(state, sigma), rtol=1e-9)
+    found, _ = widened(state, sigma, np.zeros((200, 6)), falls)
+    np.testing.assert_allclose(found**2, plain(state, sigma, falls), rtol=1e-9)
 
 
 def test_along_the_line_of_sight():
