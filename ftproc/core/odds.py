@@ -18,13 +18,12 @@ SURE = 8.0  # what bends a track or widens its sigmas: correlated noise, another
 OPEN = 12.0  # within which a jump may be one fault or another: beside agile targets it tells little
 MANY = 15.0  # what moves half of a log, or concerns all of its readings
 ONE_END = 25.0  # a patch that motion explains but for an end: starts and turns gain 21 without one, missed patches 43
-ANEW = (
-    100.0  # decisions on a whole log that were made from another start: 120 and more at turns that were screened out,
-)
-# up to 75 at take-offs and patches that resemble noise that has grown
+ANEW = 100.0  # decisions on a whole log that were made from another start: 120 and more at turns that were screened
+# out, up to 75 at take-offs and patches that resemble noise that has grown
 HOPELESS = 200.0  # what is behind by more is not followed up
 
 # Margins for each reading
+FEW_ANEW = 0.2  # for ANEW, where that is less: rockets that burn for some of 31 to 55 rows gain 0.3 to 1.3
 COSTS = (
     3.0  # what a more agile target costs where its track is lost in the end; patches cost up to 6, but seem no more so
 )

@@ -208,10 +208,19 @@ def _decided(
         if takes_in and log_probability(*other) > log_probability(*found) - odds.HOPELESS:
             found = preferred(found, _examined(*other, known))
     elif not work.of_window and rejects_runs(*found):  # what screening took for patches was believed
-        other = begin(record, possible.astype(float))
-        if log_probability(*other) > log_probability(*found) + odds.ANEW:
-            found = preferred(found, _examined(*other, known))
+        other = begin(record._replace(sigma=found[0].sigma), possible.astype(float))
+        found = _nothing_screened(found, other, known)
     return found
+
+
+def _nothing_screened(
+    found: tuple[Record, Decision], other: tuple[Record, Decision], known: Known
+) -> tuple[Record, Decision]:
+    """The decisions from another start, if these are far likelier; a short log tells less, and is soon examined."""
+    likely, least = log_probability(*found), min(odds.ANEW, odds.FEW_ANEW * found[0].possible.sum())
+    if log_probability(*other) > likely + (least if least == odds.ANEW else -odds.HOPELESS):
+        other = _examined(*other, known)
+    return preferred(found, other) if log_probability(*other) > likely + least else found
 
 
 def _forgets(record: Record, decision: Decision) -> bool:
@@ -255,9 +264,7 @@ def _much_stiffer(one: Decision, other: Decision) -> bool:
 
 def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:
     """The decisions made again where the noise is not even, and where they do not explain the log."""
-    found = (record, decision)
-    if not record.white:
-        found = allow_for_tails(*_with_late_stamps(record, decision))
+    found = (record, decision) if record.white else allow_for_tails(*_with_late_stamps(record, decision))
     for _ in range(0 if record.white else DRIFT_ROUNDS):
         before, found = found, likelier(found, allow_for_drift(*found))
         if _rejects_many(*before, REJECTED):

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from ftproc.core import odds
 from ftproc.core.editing import two_pass
 from ftproc.core.identification import profile
 from ftproc.core.model.frames import from_cartesian
+from ftproc.simulation import simulate
 
 pytestmark = pytest.mark.compiled
 
@@ -102,6 +106,20 @@ def test_a_take_off_is_no_patch(monkeypatch):
     rejected, off = worst_of(flights[1:2])
     assert rejected > 0.04
     assert off > 7
+
+
+ROCKETS = (1.0, 205), (1.0, 212), (1.0, 226), (0.5, 213), (0.5, 221)  # interval s, seed
+
+
+def test_a_rocket_of_few_readings_is_no_patch(monkeypatch):
+    """It burns within some of them, and does nothing in the others."""
+    flights = [simulate("ballistic", seed=seed, dt_s=dt_s) for dt_s, seed in ROCKETS]
+    flights = [(each.log.time_s, each.log.measurement, each.truth.position_m) for each in flights]
+    largest, rejected = edited(flights)
+    assert largest.max() < 30
+    assert rejected.max() < 0.01
+    monkeypatch.setattr(two_pass, "odds", SimpleNamespace(**{**vars(odds), "FEW_ANEW": odds.ANEW}))
+    assert edited(flights)[0].min() > 300
 
 
 def test_a_patch_that_begins_and_ends_with_a_jump_is_one():
