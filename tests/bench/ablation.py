@@ -71,6 +71,10 @@ def _by_the_median(log: Any, model: Any, at_median: Any = None) -> Any:
     return find_starts(log, typical.noise_variance, float(typical.jerk[0, 0]))
 
 
+def _calm(short: Any, model: Any) -> Any:
+    return model, 0.0
+
+
 def _same_screen(screen: Callable[..., Any], *arguments: Any) -> Any:
     found = screen(*arguments)
     return found._replace(jumps_only=found.weight)
@@ -104,6 +108,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "tails": (Off(TWO_PASS, "allow_for_tails", _pair),),
     "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
+    "nothing screened": (Off(TWO_PASS, "rejects_runs", lambda *_: False),),
     "rejected runs": (Off(TWO_PASS, "reassess_rejected", lambda record, decision, work: (decision, ())),),
     "faults that last": (Off(f"{EDITING}.lasting.settling", "search", _empty),),
     "jumps that the part around them explains": (
@@ -120,6 +125,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "patches followed beside a rejected run": (Off(f"{REJECTED}.rejected_runs", "followed", _empty),),
     "runs of several components as one motion": (Off(f"{REJECTED}.joining", "_together", _empty),),
     "abrupt changes": (Off(f"{IDENTIFICATION}.motions.jolts", "told", _nothing),),
+    "wind of what falls": (Off(f"{IDENTIFICATION}.motions.falling", "_blown", _calm),),
     "speeds that settle": (Off(f"{IDENTIFICATION}.motions.motion_models", "FADING", ()),),
     "patches of several that were joined": (
         Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),

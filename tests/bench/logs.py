@@ -34,6 +34,7 @@ APART = {"5": 0.006, "0.5": 0.001}
 GAPS = (9, 11, 43, 57)  # flights with gaps
 LOCKED = ("0.1/301", "0.1/305", "0.2/302")  # seconds between readings while a mount that has locked on swings
 WEAVING = ("0.2/301", "0.2/303", "0.2/306")  # of an aircraft that weaves on its way to or from the instrument
+FALLING = ("0.05/206", "0.05/217", "0.5/221", "1/205")  # bombs and shells in wind, and rockets of few readings
 COARSE, OFF = ("2", "4"), 0.05  # sigmas to which a glider's readings are rounded, and share of outliers among them
 WAVES = ("sine/8", "sine/9", "sine/36", "sine/42", "sine/54")  # patches of hard flights that go to and fro
 HELD_S = 1200.0  # of an aircraft that holds, at 10 Hz
@@ -65,6 +66,7 @@ def names() -> list[str]:
     slow += [f"soaring/1/{seed}" for seed in (78, *SEEDS)]  # and of these one to be off in its circles
     slow += [f"coarse/{step}/{seed}" for step in COARSE for seed in SEEDS]
     slow += [*(f"locked/{what}" for what in LOCKED), *(f"weaving/{what}" for what in WEAVING)]
+    slow += [f"falling/{what}" for what in FALLING]
     waves = [f"gaps/all/{number}" for number in GAPS] + [f"hard/{what}" for what in WAVES]
     fused = [f"range/{name}/{seed}" for name in RANGES for seed in SEEDS]
     samples = [f"sample/{path.name}/0" for path in sorted(SAMPLES.iterdir()) if _is_log(path)]
@@ -97,6 +99,11 @@ def _scenario(what: str, seed: int, room: Path) -> Seen:
     found = simulate(what, seed=seed)
     if found.truth.time_s[-1] > LONGEST_S:
         found = simulate(what, seed=seed, duration_s=LONGEST_S)
+    return Seen(found.log, found.truth.time_s, found.truth.position_m)
+
+
+def _falling(what: str, seed: int, room: Path) -> Seen:
+    found = simulate("ballistic", seed=seed, dt_s=float(what))
     return Seen(found.log, found.truth.time_s, found.truth.position_m)
 
 
@@ -185,6 +192,7 @@ _MAKERS: dict[str, Callable[[str, int, Path], Seen]] = {
     "coarse": _coarse,
     "locked": _locked,
     "weaving": _weaving,
+    "falling": _falling,
     "gaps": _gaps,
     "range": _range,
 }
