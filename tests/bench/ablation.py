@@ -71,7 +71,7 @@ def _by_the_median(log: Any, model: Any, at_median: Any = None) -> Any:
     return find_starts(log, typical.noise_variance, float(typical.jerk[0, 0]))
 
 
-def _calm(short: Any, model: Any) -> Any:
+def _no_wind(short: Any, model: Any) -> Any:
     return model, 0.0
 
 
@@ -125,7 +125,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "patches followed beside a rejected run": (Off(f"{REJECTED}.rejected_runs", "followed", _empty),),
     "runs of several components as one motion": (Off(f"{REJECTED}.joining", "_together", _empty),),
     "abrupt changes": (Off(f"{IDENTIFICATION}.motions.jolts", "told", _nothing),),
-    "wind of what falls": (Off(f"{IDENTIFICATION}.motions.falling", "_blown", _calm),),
+    "wind of what falls": (Off(f"{IDENTIFICATION}.motions.falling", "_blown", _no_wind),),
     "speeds that settle": (Off(f"{IDENTIFICATION}.motions.motion_models", "FADING", ()),),
     "patches of several that were joined": (
         Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),

@@ -37,10 +37,16 @@ class Logged(NamedTuple):
 def falls(course: FloatArray) -> bool:
     """Whether a good part of a course (n, 9) has almost no lift: that of a bomb, or of a rocket; or an aircraft dropped
     what is followed."""
-    v, force = course[:, 3:6], course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
+    v, force = course[:, 3:6], _force(course)
     along = (force * v).sum(1) / np.maximum((v * v).sum(1), AT_REST_MPS**2)
     lift = np.sqrt(((force - along[:, None] * v) ** 2).sum(1))
     return bool((lift < LIFT * GRAVITY).mean() > SHARE)
+
+
+def _force(course: FloatArray) -> FloatArray:
+    """(n, 3) m/s2, without gravity."""
+    found: FloatArray = course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
+    return found
 
 
 def fit(short: Logged, model: Model) -> tuple[Model, float]:
@@ -57,8 +63,8 @@ def fit(short: Logged, model: Model) -> tuple[Model, float]:
         best, doubt = _blown(short, best)
         best, likelihood = _climbed(short, best, 1)
         likelihood -= doubt
-    force = best.motion.course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
-    least = max(DRIFT**2 * float(np.median((force**2).sum(1))) / scales.span_s, scales.jerk_psd(scales.span_s))
+    force2 = float(np.median((_force(best.motion.course) ** 2).sum(1)))
+    least = max(DRIFT**2 * force2 / scales.span_s, scales.jerk_psd(scales.span_s))
     return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, least)), likelihood
 
 
