@@ -130,6 +130,10 @@ def test_two_radars_predict_where_a_bomb_comes_down(run, tmp_path, monkeypatch):
     result = run("filter", "--fuse", "two.toml", "--motion", "ballistic", "--smooth", "-o", "two.csv")
     assert (result.code, result.err) == (0, "")
     assert "impact     predicted at x " in result.out
+    track, velocity = pd.read_csv("two.csv"), np.gradient(position, time_s, axis=0)[kept]
+    wrong, sigma = track.filter(regex="^v[xyz]_") - velocity, track.filter(regex="^sigma_v[xyz]_")
+    assert (np.abs(wrong.to_numpy()) < 3 * sigma.to_numpy()).mean() > 0.95
+    assert sigma.median().max() < 0.06  # .14 with gusts as on wings
     found = json.loads((tmp_path / "two.json").read_text())["summary"]["impact"]
     assert found["ground"] == "the height of the origin"
     assert found["after_last_reading_s"] == pytest.approx(4.0, abs=0.1)

@@ -1,5 +1,5 @@
 """The motion of what nobody steers: bombs, shells, rockets that have burnt out. Its jerk may be far less than the
-changes of its acceleration, which gravity and drag explain; how much depends on the wind, which the log tells.
+changes of its acceleration, which gravity and drag explain. The drag depends on the wind, which the log shows.
 """
 
 from __future__ import annotations
